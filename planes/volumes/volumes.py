@@ -305,7 +305,8 @@ class Polygons(Hulls):
     """Convex polygons: points (M, 2), and as `starts` the first point of each row (N,); either turning sense."""
 
     def __init__(self, points: object, starts: object) -> None:
-        given, first = _ragged_points(points, starts)
+        given = reals("points", points, (None, 2))
+        first = _checked_starts(starts, len(given))
         row, (_, after) = rows_of(first, len(given))[1], neighbours(first, len(given))
         kept = (given != given[after]).any(axis=1)
         counts = np.bincount(row[kept], minlength=len(first))
@@ -355,12 +356,6 @@ def _checked_starts(starts: object, total: int) -> Ints:
     if (len(first) and first[0] != 0) or (np.diff(first) < 1).any() or (total and not len(first)):
         raise InputError(f"starts: expected 0 and then numbers that grow, got {first[:9].tolist()}")
     return first
-
-
-def _ragged_points(points: object, starts: object) -> tuple[Floats, Ints]:
-    """Check points (M, 2) of ragged rows and the index of each row's first point."""
-    given = reals("points", points, (None, 2))
-    return given, _checked_starts(starts, len(given))
 
 
 def _even(n: int, count: int) -> tuple[Ints, Ints]:
@@ -437,7 +432,8 @@ class ConcavePolygons(Parts):
     """
 
     def __init__(self, points: object, starts: object) -> None:
-        given, first = _ragged_points(points, starts)
+        given = reals("points", points, (None, 2))
+        first = _checked_starts(starts, len(given))
         corners: list[Floats] = []
         lengths = []
         for i, row in enumerate(np.split(given, first[1:]) if len(first) else []):

@@ -41,7 +41,6 @@ from .families import (
     random_sides,
     shape_pairs,
 )
-from .truth import is_simple
 
 Whole = npt.NDArray[np.int64]
 
@@ -249,7 +248,7 @@ def _pattern(rng: Rng, n: int, size: int, places: tuple[int, int] = (0, 2), thin
         corners = rng.uniform(-1, 1, (int(rng.integers(3, 6)), 2)) * size * np.array([1, 1 / thin])
         ring = np.rint(corners).astype(np.int64)
         ring = PX * ring if rng.random() < 0.6 else PX * ring + _wide(rng, len(ring), HALF)
-        if is_simple(ring.tolist()):
+        if truth.is_simple(ring.tolist()):
             rings.append(np.concatenate([ring, np.repeat(ring[-1:], 5 - len(ring), axis=0)]))
     every = _held(np.array(rings), n)
     p, q = random_sides(rng, every)

@@ -30,6 +30,7 @@ from ...kinds.areas import Disc, Point, Spread, Stencil
 from ...kinds.rays import Pistol, Projectile
 from ...rays.ray_hits import RayHits
 from ..peers import Segments, disc_curves, mover_curve, ray_curves
+from . import truth
 from .methods import (
     Curve,
     Decisions,
@@ -45,18 +46,6 @@ from .methods import (
     size_of,
     targets_of,
     velocities_of,
-)
-from .truth import (
-    Flights,
-    Round,
-    Straight,
-    discs_on_shapes,
-    first_pixels,
-    flown,
-    impacts,
-    parts_of_discs,
-    placed_rings,
-    touching,
 )
 
 REACH = 8  # median size of the objects, in radii of the disc
@@ -108,21 +97,21 @@ def areas_question(discs: Discs, curves: Sequence[Curve]) -> Question:
     exact, masks = int(discs.exact.sum()), int((~discs.exact).sum())
     texts = [f"exact shapes of {exact} objects"] * bool(exact) + [f"masks at full scale of {masks}"] * bool(masks)
     asks = f"Which objects does a disc of radius {discs.radius:g} px touch?"
-    truth = " and ".join(texts) or "nothing can be hit"
-    return Question("areas", asks, len(discs.at), _truth(discs), truth, tuple(curves), aimed=discs.aimed)
+    source = " and ".join(texts) or "nothing can be hit"
+    return Question("areas", asks, len(discs.at), _truth(discs), source, tuple(curves), aimed=discs.aimed)
 
 
 def _truth(discs: Discs) -> Decisions:
     """Return the exact shapes and the masks that discs touch, with places and shares."""
     exact = np.flatnonzero(discs.exact)
     shapes = [shape for item in exact.tolist() if (shape := _shape(discs.scene, item))]
-    of = discs_on_shapes(discs.at, discs.radius, shapes)
+    of = truth.discs_on_shapes(discs.at, discs.radius, shapes)
     masks = [target for target in targets_of(discs.scene) if not discs.exact[target[0]]]
-    on = parts_of_discs(np.floor(discs.at + 0.5).astype(np.int64), int(discs.radius), masks)
+    on = truth.parts_of_discs(np.floor(discs.at + 0.5).astype(np.int64), int(discs.radius), masks)
     return Decisions.joined([Decisions(of.shot, exact[of.object], of.xy, of.share), Decisions(*on)])
 
 
-def _shape(scene: Scene, item: int) -> Round | Straight | None:
+def _shape(scene: Scene, item: int) -> truth.Round | truth.Straight | None:
     """Return the exact shape of an object in the world, which is known of polygons and circles, but not of ellipses."""
     row = scene.items.table.row(item)
     form, outline = scene.items.forms[row], scene.items.sprites[row].outline
@@ -131,9 +120,9 @@ def _shape(scene: Scene, item: int) -> Round | Straight | None:
     position = scene.items.position_256[row] / SUB
     scale = form.scale_x / (1 << SCALE_BITS), form.scale_y / (1 << SCALE_BITS)
     if outline.radius is not None:
-        return Round(position, outline.radius / SUB * scale[0])
+        return truth.Round(position, outline.radius / SUB * scale[0])
     rings = [ring / SUB for ring in outline.rings]
-    return Straight(placed_rings(rings, form.flip, scale, scene.items.angles[row], position))
+    return truth.Straight(truth.placed_rings(rings, form.flip, scale, scene.items.angles[row], position))
 
 
 SCALES = (1 / 8, 1 / 4, 1 / 2, 1, 2, 4)
@@ -396,9 +385,9 @@ def rays_question(scene: Scene, shots: int, seed: int) -> Question:
     """
     shots, seed, alone, targets = drawn_for(scene, shots, seed)
     length = min(max(1, round(4 * size_of(targets))), LENGTH_MAX)
-    start, angle, _ = drawn_places(targets, shots, seed, SUB * length // 2, lambda xy: touching(xy, 0, targets))
+    start, angle, _ = drawn_places(targets, shots, seed, SUB * length // 2, lambda xy: truth.touching(xy, 0, targets))
     step = ahead(length, angle)
-    shot, item, pixel_xy = first_pixels(start, step, targets)
+    shot, item, pixel_xy = truth.first_pixels(start, step, targets)
     return Question(
         "rays",
         f"Which object does a ray of {length} px hit first?",
@@ -485,12 +474,12 @@ def movers_question(scene: Scene, shots: int, seed: int) -> Question:
     size = size_of(targets)
     radius, speed = min(max(1, round(size / 6)), MOVER_RADIUS_MAX), min(max(1, round(8 * size)), REACH_MAX)
     start, angle, _ = drawn_places(
-        targets, shots, seed, SUB * speed // 2, lambda xy: touching(xy, SUB * radius, targets)
+        targets, shots, seed, SUB * speed // 2, lambda xy: truth.touching(xy, SUB * radius, targets)
     )
     way = ahead(speed, angle)
-    flights = Flights(start, flown(SUB * speed, way), SUB * radius)
+    flights = truth.Flights(start, truth.flown(SUB * speed, way), SUB * radius)
     velocities = velocities_of(alone, targets)
-    first = impacts(flights, targets, velocities)
+    first = truth.impacts(flights, targets, velocities)
     point = (flights.start_256[first.flight] + first.time[:, None] * flights.step_256[first.flight]) / SUB
     once, *substeps = (_overlapping(alone, flights, None if n == 1 else n, n) for n in (1, *SUBSTEPS))
     swept = fired_method(
@@ -514,7 +503,7 @@ def movers_question(scene: Scene, shots: int, seed: int) -> Question:
     )
 
 
-def _overlapping(alone: Scene, flights: Flights, setting: int | None, steps: int) -> Method:
+def _overlapping(alone: Scene, flights: truth.Flights, setting: int | None, steps: int) -> Method:
     """Return a method that moves the objects and tests a disc at each step, which hits the nearest that it overlaps."""
     start, step, disc = flights.start_256 / SUB, flights.step_256 / SUB, Disc(flights.radius_256 / SUB)
 
@@ -569,7 +558,7 @@ def spread_question(scene: Scene, shots: int, seed: int) -> Question:
         "spread",
         f"How much of a blast of {radius} px lies on each object?",
         shots,
-        Decisions(*parts_of_discs(at, radius, targets)),
+        Decisions(*truth.parts_of_discs(at, radius, targets)),
         "every pixel of the blast is looked up in the mask of every object, at full scale",
         (Curve("pellets", "pellets", tuple(map(pellets, PELLETS)), note), Curve("every pixel", "", (every,))),
         by_share=True,
