@@ -152,7 +152,7 @@ class BroadPhase(ABC):
         """
         rows = box_rows("boxes", boxes, self.dim)
         query, found = piled(self._find(rows, None))
-        return sorted_pairs(query, found, self._count)
+        return sorted_pairs(query, found, self._count, once=True)
 
     def pairs(self) -> Ints:
         """Find the boxes that overlap each other: (2, K) int64 ids [i, j] with i < j, sorted."""
@@ -160,7 +160,7 @@ class BroadPhase(ABC):
         query, found = piled(self._find(self._rows[ids], None))
         first = ids[query]
         keep = first < found
-        return sorted_pairs(first[keep], found[keep], self._count)
+        return sorted_pairs(first[keep], found[keep], self._count, once=True)
 
     def work(self, boxes: object) -> Work:
         """Nodes and boxes that a query of these boxes visits and tests."""
@@ -207,7 +207,7 @@ class BroadPhase(ABC):
 
     @abstractmethod
     def _find(self, queries: Floats, work: Work | None) -> list[Pairs]:
-        """Overlapping (query, id), each pair once, in any order and any pieces."""
+        """Overlapping (query, id), in any order and any pieces; a pair may be found more than once."""
 
     def _enter(self, ids: Ints) -> None:  # noqa: B027
         """Insert boxes that are new in the table."""

@@ -13,10 +13,7 @@ import numpy as np
 from ..common.checks import Floats, InputError, Ints, integer, integers, real
 from ..common.limits import CHUNK_SAMPLES, GRID_FRESH, OVERSIZED_CELLS
 from ..grid.spans import begins, pieces, ragged
-from .boxes import LARGEST, BroadPhase, Cells, Pairs, Work
-
-FIRST_BITS = 3
-"""Lowest bits of an entry, one per axis, set if the cell is the box's first on that axis. The other bits are its id."""
+from .boxes import LARGEST, BroadPhase, Cells, Pairs, Work, sorted_pairs
 
 NOWHERE, BESIDE, MAIN, FRESH = range(4)
 """Where a box is listed: not at all, in the list of oversized boxes, in the sorted cells, in the fresh entries."""
@@ -106,7 +103,7 @@ class Grid(BroadPhase):
         found = [self._beside[((first <= at) & (at <= last)).all(axis=1)]]
         for home, listing in zip((MAIN, FRESH), self._listings, strict=True):
             start, length = (int(v[0]) for v in listing.runs(self._keys(at[None])))
-            listed = listing.entry[start : start + length] >> FIRST_BITS
+            listed = listing.entry[start : start + length]
             found.append(listed[self._home[listed] == home])
         return np.sort(np.concatenate(found))
 
@@ -132,7 +129,7 @@ class Grid(BroadPhase):
             low = self.origin + self.cell * (at - self._reach)
             box = np.clip(np.concatenate((low, low + self.cell), axis=1), -LARGEST, LARGEST)
         main = self._listings[0]
-        living = np.append(0, np.cumsum(self._home[main.entry >> FIRST_BITS] == MAIN))[main.start]
+        living = np.append(0, np.cumsum(self._home[main.entry] == MAIN))[main.start]
         box[np.flatnonzero(np.diff(living) == 0)] = np.repeat((np.inf, -np.inf), self.dim)
         return Cells(np.arange(len(key)), box, np.ones(len(key), np.bool_))
 
@@ -150,7 +147,7 @@ class Grid(BroadPhase):
         for home, listing in zip((MAIN, FRESH), self._listings, strict=True):
             assert (np.diff(listing.key) > 0).all(), "cells are not in order"
             key, entry = listing.entries()
-            good = self._home[entry >> FIRST_BITS] == home
+            good = self._home[entry] == home
             assert home == MAIN or good.all(), "a box that has gone is listed among the fresh ones"
             assert home == FRESH or self._stale == np.count_nonzero(~good), "stale entries are miscounted"
             kept.append(np.stack((key[good], entry[good])))
@@ -168,40 +165,33 @@ class Grid(BroadPhase):
         for piece in pieces(sizes[narrow].astype(np.int64), CHUNK_SAMPLES):
             rows = narrow[piece]
             group, at = _written_out(span[rows])
-            first = _first(at, span[rows, 0], group)
             for home in (MAIN, FRESH):
-                found += self._in_cells(queries, rows.take(group), at, first, home, work)
+                found += self._in_cells(queries, rows.take(group), at, home, work)
         return found
 
-    def _in_cells(
-        self, queries: Floats, query: Ints, at: Ints, first: Ints, home: int, work: Work | None
-    ) -> list[Pairs]:
-        """Search cells; a pair counts only in the first cell that both boxes share, so that it is found once.
-
-        On each axis this is the first cell of one of the two boxes.
-        """
-        start, length = self._listings[home - MAIN].runs(self._keys(at))
-        if work is not None and len(self._listings[home - MAIN].key):
+    def _in_cells(self, queries: Floats, query: Ints, at: Ints, home: int, work: Work | None) -> list[Pairs]:
+        """Search cells; both boxes of a pair may share several, so repeats are dropped, some at a time."""
+        listing = self._listings[home - MAIN]
+        start, length = listing.runs(self._keys(at))
+        if work is not None and len(listing.key):
             work.compared += len(at)
         filled = np.flatnonzero(length)
         if not len(filled):
             return []
-        query, first, start, length = (part.take(filled) for part in (query, first, start, length))
+        query, start, length = (part.take(filled) for part in (query, start, length))
         if work is not None:
             before = len(self._listings[0].key) if home == FRESH else 0
-            work.visits.append((query, before + np.searchsorted(self._listings[home - MAIN].start, start)))
+            work.visits.append((query, before + np.searchsorted(listing.start, start)))
         found: list[Pairs] = []
         for piece in pieces(length, CHUNK_SAMPLES):
             group, place = ragged(length[piece])
-            entry = self._listings[home - MAIN].entry.take(start[piece].take(group) + place)
-            shared = (entry | first[piece].take(group)) & (1 << self.dim) - 1
-            here = np.flatnonzero(shared == (1 << self.dim) - 1)
-            box, asked = entry.take(here) >> FIRST_BITS, query[piece].take(group.take(here))
+            box, asked = listing.entry.take(start[piece].take(group) + place), query[piece].take(group)
             if home == MAIN and self._stale:
                 keep = np.flatnonzero(self._home.take(box) == MAIN)
                 box, asked = box.take(keep), asked.take(keep)
             good = np.flatnonzero(self._meeting(queries, asked, box, work))
-            found.append((asked.take(good), box.take(good)))
+            asked, box = sorted_pairs(asked.take(good), box.take(good), self._count, once=True)
+            found.append((asked, box))
         return found
 
     def _enter(self, ids: Ints) -> None:
@@ -215,9 +205,8 @@ class Grid(BroadPhase):
 
     def _listed(self, ids: Ints) -> Pairs:
         """Cells of boxes that are not oversized, as (key, entry)."""
-        span = self._place[ids]
-        group, at = _written_out(span)
-        return self._keys(at), ids[group] << FIRST_BITS | _first(at, span[:, 0], group)
+        group, at = _written_out(self._place[ids])
+        return self._keys(at), ids[group]
 
     def _leave(self, ids: Ints) -> None:
         homes = self._home[ids]
@@ -226,7 +215,7 @@ class Grid(BroadPhase):
         if (homes == BESIDE).any():
             self._beside = self._beside[self._home[self._beside] == BESIDE]
         key, entry = self._listings[1].entries()
-        keep = self._home[entry >> FIRST_BITS] == FRESH
+        keep = self._home[entry] == FRESH
         self._list(key[keep], entry[keep])
 
     def _shift(self, ids: Ints, rows: Floats) -> None:
@@ -245,8 +234,8 @@ class Grid(BroadPhase):
             self.written += len(key)
             return
         old_key, old_entry = self._listings[0].entries()
-        keep = self._home[old_entry >> FIRST_BITS] == MAIN
-        self._home[entry >> FIRST_BITS] = MAIN
+        keep = self._home[old_entry] == MAIN
+        self._home[entry] = MAIN
         main = Listing.of(np.concatenate((old_key[keep], key)), np.concatenate((old_entry[keep], entry)))
         self._listings = [main, Listing.of(key[:0], entry[:0])]
         self.written += len(main.entry)
@@ -280,14 +269,6 @@ def _written_out(span: Ints) -> Pairs:
         place, step = np.divmod(place, sides[group, axis])
         at[:, axis] = low[group, axis] + step
     return group, at
-
-
-def _first(at: Ints, low: Ints, group: Ints) -> Ints:
-    """Bits, one per axis, that say whether cells (K, d) are the first of their boxes, low[group]."""
-    bits = np.zeros(len(at), np.int64)
-    for axis in range(at.shape[1]):
-        bits |= (at[:, axis] == low[:, axis].take(group)).astype(np.int64) << axis
-    return bits
 
 
 def _in_order(entries: Ints) -> Ints:

@@ -27,7 +27,7 @@ Nodes = dict[str, npt.NDArray[Any]]  # rows of nodes, one array per field of FIE
 
 FIELDS: dict[str, tuple[type, int]] = {
     "cell": (np.float64, 4),  # as drawn: the root in quarters
-    "gate": (np.float64, 4),  # points that belong to this cell: above the first two numbers, up to the last two
+    "gate": (np.float64, 4),  # the same, but unbounded at the border of the root
     "mid": (np.float64, 2),
     "child": (np.int64, 0),  # first of four, -1 for a leaf
     "depth": (np.int64, 0),  # -1 when the row is free
@@ -109,7 +109,7 @@ class Quadtree(BroadPhase):
         return self._in_leaves(queries, query, leaf, work)
 
     def _in_leaves(self, queries: Floats, query: Ints, leaf: Ints, work: Work | None) -> list[Pairs]:
-        """Search leaves; a pair counts only in the cell of its first common point, so that it is found once."""
+        """Search leaves; both boxes of a pair may reach several, so repeats are dropped, some at a time."""
         found: list[Pairs] = []
         length = self._nodes["length"].take(leaf)
         filled = np.flatnonzero(length)
@@ -119,13 +119,8 @@ class Quadtree(BroadPhase):
             box = self._pool.take(self._nodes["start"].take(leaf[piece]).take(group) + place)
             asked = query[piece].take(group)
             good = np.flatnonzero(self._meeting(queries, asked, box, work))
-            asked, box, group = asked.take(good), box.take(good), group.take(good)
-            corner = np.maximum(queries.take(asked, axis=0), self._rows.take(box, axis=0))
-            gate = self._nodes["gate"].take(leaf[piece].take(group), axis=0)
-            own = (gate[:, 0] < corner[:, 0]) & (corner[:, 0] <= gate[:, 2])
-            own &= (gate[:, 1] < corner[:, 1]) & (corner[:, 1] <= gate[:, 3])
-            mine = np.flatnonzero(own)
-            found.append((asked.take(mine), box.take(mine)))
+            asked, box = sorted_pairs(asked.take(good), box.take(good), self._count, once=True)
+            found.append((asked, box))
         return found
 
     def _enter(self, ids: Ints) -> None:
