@@ -27,7 +27,6 @@ Nodes = dict[str, npt.NDArray[Any]]  # rows of nodes, one array per field of FIE
 
 FIELDS: dict[str, tuple[type, int]] = {
     "cell": (np.float64, 4),  # as drawn: the root in quarters
-    "gate": (np.float64, 4),  # the same, but unbounded at the border of the root
     "mid": (np.float64, 2),
     "child": (np.int64, 0),  # first of four, -1 for a leaf
     "depth": (np.int64, 0),  # -1 when the row is free
@@ -74,7 +73,9 @@ class Quadtree(BroadPhase):
         """Cells from the root down; those at the border are unbounded."""
         number = np.flatnonzero(self._nodes["depth"] >= 0)
         number = number[np.argsort(self._nodes["depth"][number], kind="stable")]
-        return Cells(number, self._nodes["gate"][number], self._nodes["child"][number] < 0)
+        cell, root = self._nodes["cell"][number], self._nodes["cell"][0]
+        box = np.where(cell == root, (-np.inf, -np.inf, np.inf, np.inf), cell)
+        return Cells(number, box, self._nodes["child"][number] < 0)
 
     def check(self) -> None:
         """Raise AssertionError naming the first invariant that does not hold."""
@@ -150,7 +151,6 @@ class Quadtree(BroadPhase):
         rows = self._rows[ids]
         self._nodes = nodes = _nodes(1)
         nodes["cell"][0] = _root_of(rows)
-        nodes["gate"][0] = (-np.inf, -np.inf, np.inf, np.inf)
         nodes["mid"][:] = _middle(nodes["cell"])
         nodes["child"][0] = -1
         self._free = np.empty(0, np.int64)
@@ -309,12 +309,10 @@ class Quadtree(BroadPhase):
         nodes["child"][splits] = first
         for quarter in range(4):
             right, down, child = quarter % 2, quarter // 2, first + quarter
-            for bounds in ("cell", "gate"):
-                part = nodes[bounds][splits]
-                part[:, 0 if right else 2] = nodes["mid"][splits, 0]
-                part[:, 1 if down else 3] = nodes["mid"][splits, 1]
-                nodes[bounds][child] = part
-            nodes["mid"][child] = _middle(nodes["cell"][child])
+            part = nodes["cell"][splits]
+            part[:, 0 if right else 2] = nodes["mid"][splits, 0]
+            part[:, 1 if down else 3] = nodes["mid"][splits, 1]
+            nodes["cell"][child], nodes["mid"][child] = part, _middle(part)
             nodes["child"][child] = -1
             nodes["depth"][child] = nodes["depth"][splits] + 1
 
