@@ -15,7 +15,7 @@ from hitplanes.planes.common.checks import InputError
 from hitplanes.planes.common.tables import Mask
 from hitplanes.planes.files import scene_folder
 from hitplanes.planes.files.png import read_png, write_png
-from hitplanes.planes.files.scene_folder import load_scene, read_scene
+from hitplanes.planes.files.scene_folder import load_scene
 from hitplanes.planes.scene.items import Items
 from hitplanes.planes.scene.objects import Role
 from hitplanes.planes.scene.scene import Scene
@@ -654,7 +654,7 @@ def test_a_missing_scene_is_named(tmp_path: Path, is_folder: bool) -> None:
     if is_folder:
         (tmp_path / "scene.json").mkdir()
     with pytest.raises(InputError, match=r"scene\.json: cannot read it"):
-        read_scene(tmp_path)
+        load_scene(tmp_path)
 
 
 def test_an_id_far_away_does_not_fill_the_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

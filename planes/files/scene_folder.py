@@ -5,14 +5,15 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path, PurePosixPath
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..common.checks import Image, InputError, integer, path_of, suggestion, within
 from ..common.limits import (
+    ALL,
     ALPHA_THRESHOLD,
     ANGLE_STEPS_MAX,
     COST_MAX,
@@ -50,23 +51,17 @@ from ..common.tables import (
     json_of,
     typed,
 )
-from ..scene.objects import Role
-from ..scene.scene import Scene
+from ..scene.objects import OCCLUDER, PLANE_NAMES, ROLES
+from ..scene.scene import Scene, default_bits
 from ..scene.sprite import Carving, Sprite, frame_pivot, frozen, local_grid, rows_of
-from ..scene.variants import FLIPS
+from ..scene.variants import FLIPS, ONE
 from .png import possible, read_png, read_text, write_png, write_text
 
 FORMAT = "hitplanes-scene/2"
 ONE_FILTER = "hitplanes-scene/1"  # older format, in which `accept` of a shot is the filter of what blocks, too
 
 FILE_NAME = "scene.json"
-SECTIONS = {
-    "background": Role.BACKGROUND,
-    "hittable": Role.HITTABLE,
-    "movers": Role.MOVER,
-    "occluders": Role.OCCLUDER,
-    "hud": Role.HUD,
-}
+SECTIONS = dict(zip(PLANE_NAMES, ROLES, strict=True))
 POINT = Numbers((2,), POSITION_MAX)
 PIVOT = Numbers((2,), MASK_SIDE_MAX)
 COLOR = Wholes((3,), 0, 255)
@@ -112,80 +107,63 @@ SHEET_WIDTH = 4096  # approximate width of the sheet on which the frames of a sa
 MASK_ROWS_AREA = 4096  # largest mask that is saved as rows of text, px; larger ones are saved as images
 
 
-@dataclass
-class FileObject:
-    """An object of a scene file; `pose` has only the keys that are given; `place` is for errors."""
+class Entry(NamedTuple):
+    """An object of a scene file: its place there, its id and owner if they are given, and what `Scene.add` is given."""
 
-    role: Role
-    sprite: Sprite
-    position_xy: tuple[float, float]
-    pose: dict[str, Any] = field(default_factory=dict)
-    name: str | None = None
-    categories: list[str] | None = None
-    owner: str | int | None = None
-    id: int | None = None
-    place: str = ""
+    place: str
+    id: int | None
+    owner: str | int | None
+    options: dict[str, Any]
 
 
-@dataclass
-class SceneFile:
-    """The content of a scene file, in the order of the file."""
+def load_scene(folder: str | Path) -> Scene:
+    """Read a scene folder, scene.json and the PNGs that it names, given its path or that of its scene.json.
 
-    name: str = "scene"
-    origin_xy: tuple[int, int] = (0, 0)
-    size_wh: tuple[int, int] | None = None
-    categories: list[str] = field(default_factory=list)
-    objects: list[FileObject] = field(default_factory=list)
-    weapons: dict[str, Any] = field(default_factory=dict)
-    shots: list[Any] = field(default_factory=list)
+    Weapons and shots of the file are kept as plain JSON in `scene.weapons` and `scene.shots`.
 
-
-def read_scene(folder: Path) -> SceneFile:
-    """Read a scene folder; an InputError names the file, the section, the row and the field."""
-    path = folder / FILE_NAME
-    with within(str(path)):
-        data = SCENE.check("scene", json_of(read_text(path)))
+    Raises
+    ------
+    InputError
+        With the names of the file, the section, the row and the field.
+    """
+    path = scene_folder(path_of("folder", folder))
+    with within(str(path / FILE_NAME)):
+        data = SCENE.check("scene", json_of(read_text(path / FILE_NAME)))
+        name = data.get("name") or Text().check("name", path.resolve().name)
+        entries = _entries(data.get("objects", {}), path)
         bounds = data.get("bounds") or {}
-        scene = SceneFile(
-            name=data.get("name") or Text().check("name", folder.resolve().name),
-            origin_xy=bounds.get("origin_xy", (0, 0)),
-            size_wh=bounds.get("size_wh"),
-            categories=data.get("categories", []),
-            weapons=data.get("weapons", {}),
-            shots=[_shot_now(shot, data["format"]) for shot in data.get("shots", [])],
+        scene = Scene(
+            bounds.get("size_wh"), bounds.get("origin_xy", (0, 0)), categories=data.get("categories", ()), name=name
         )
-        sprites: dict[str, Sprite] = {}
-        for section, role in SECTIONS.items():
-            for row, entry in enumerate(data.get("objects", {}).get(section, [])):
-                place = f"objects.{section}[{row}]"
-                with within(place):
-                    scene.objects.append(_object(entry, role, place, folder, sprites))
+        scene.weapons = data.get("weapons", {})
+        scene.shots = [_shot_now(shot, data["format"]) for shot in data.get("shots", ())]
+        _add_entries(scene, entries)
         return scene
 
 
-def write_scene(folder: Path, scene: SceneFile) -> None:
+def write_scene(folder: Path, scene: Scene) -> None:
     """Write a scene folder, images first and scene.json last, so that an interrupt leaves the old scene intact."""
-    for entry in scene.objects:
-        with within(f"object {entry.id}"):
-            _image_name(entry.sprite)
+    items, rows = scene.items, scene.items.rows
+    for row in rows.tolist():
+        with within(f"object {items.id[row]}"):
+            _image_name(items.sprites[row])
     with possible(f"folder: cannot make {folder}"):
         folder.mkdir(parents=True, exist_ok=True)
     saved: dict[int, dict[str, Any]] = {}
     images: dict[str, str | None] = {}
-    sections: dict[str, list[dict[str, Any]]] = {section: [] for section in SECTIONS}
-    for entry in scene.objects:
-        if entry.sprite.uid not in saved:
-            saved[entry.sprite.uid] = _saved_source(entry.sprite, folder, images)
-        section = next(name for name, role in SECTIONS.items() if role is entry.role)
-        sections[section].append(_object_json(entry, saved[entry.sprite.uid]))
-    size_wh = scene.size_wh
-    bounds = None if size_wh is None else {"origin_xy": list(scene.origin_xy), "size_wh": list(size_wh)}
+    objects: dict[str, list[dict[str, Any]]] = {section: [] for section in SECTIONS}
+    for row, role in zip(rows.tolist(), items.role[rows].tolist(), strict=True):
+        sprite = items.sprites[row]
+        if sprite.uid not in saved:
+            saved[sprite.uid] = _saved_source(sprite, folder, images)
+        objects[PLANE_NAMES[role]].append(_object_json(scene, row, saved[sprite.uid]))
+    x, y, x_max, y_max = scene.bounds or (0, 0, 0, 0)
     data = {
         "format": FORMAT,
         "name": scene.name,
-        "bounds": bounds,
-        "categories": scene.categories,
-        "objects": sections,
+        "bounds": scene.bounds and {"origin_xy": [x, y], "size_wh": [x_max - x + 1, y_max - y + 1]},
+        "categories": _saved_categories(scene),
+        "objects": objects,
         "weapons": scene.weapons,
         "shots": scene.shots,
     }
@@ -226,7 +204,20 @@ def _shot_now(shot: Any, written: str) -> Any:
     return shot
 
 
-def _object(entry: object, role: Role, place: str, folder: Path, sprites: dict[str, Sprite]) -> FileObject:
+def _entries(objects: dict[str, Sequence[object]], folder: Path) -> list[Entry]:
+    """Check the objects of a file, and put them in the order in which a scene gets them."""
+    entries, sprites = [], dict[str, Sprite]()
+    for section, role in SECTIONS.items():
+        for row, given in enumerate(objects.get(section, ())):
+            place = f"objects.{section}[{row}]"
+            with within(place):
+                data = _object(given, folder, sprites)
+                entries.append(Entry(place, data.pop("id", None), data.pop("owner", None), {**data, "role": role}))
+    return entries
+
+
+def _object(entry: object, folder: Path, sprites: dict[str, Sprite]) -> dict[str, Any]:
+    """Check an object, and replace what makes its sprite by that; `sprites` has those of earlier objects."""
     given = typed("object", entry, dict)
     kinds = [key for key in SOURCES if key in given]
     if len(kinds) != 1:
@@ -236,15 +227,13 @@ def _object(entry: object, role: Role, place: str, folder: Path, sprites: dict[s
         raise InputError(f"source: expected one of {', '.join(SOURCES)}, got {got}{hint}")
     kind = kinds[0]
     data = OBJECT[kind].check("object", given)
-    source = {key: given[key] for key in SOURCES[kind] if key in given}
+    made_of = {key: data.pop(key) for key in SOURCES[kind] if key in data}
+    source = {key: given[key] for key in made_of}
     shared = json.dumps(source, sort_keys=True)
     if shared not in sprites:
-        carvings = data.pop("carved", ())
-        sprite = READERS[kind]({key: data[key] for key in source if key in data}, folder, source)
-        sprites[shared] = _carved_sprite(sprite, carvings, folder)
-    pose = {key: data[key] for key in POSE if key in data}
-    options = {key: data.get(key) for key in ("name", "categories", "owner", "id")}
-    return FileObject(role, sprites[shared], data["position_xy"], pose, place=place, **options)
+        carvings = made_of.pop("carved", ())
+        sprites[shared] = _carved_sprite(READERS[kind](made_of, folder, source), carvings, folder)
+    return {**data, "sprite": sprites[shared]}
 
 
 def _image_sprite(data: dict[str, Any], folder: Path, source: dict[str, Any]) -> Sprite:
@@ -301,11 +290,33 @@ def _inside(folder: Path, text: str) -> Path:
     return path
 
 
-def _object_json(entry: FileObject, source: dict[str, Any]) -> dict[str, Any]:
-    data: dict[str, Any] = {"id": entry.id, "name": entry.name, **source}
-    data |= {"position_xy": list(entry.position_xy), **entry.pose}
-    given = {"categories": entry.categories, "owner": entry.owner}
-    return data | {key: value for key, value in given.items() if value is not None}
+def _object_json(scene: Scene, row: int, source: dict[str, Any]) -> dict[str, Any]:
+    """An object with its source as JSON; what it has by default is left out."""
+    items, form = scene.items, scene.items.forms[row]
+    item, bits, default = int(items.id[row]), int(items.categories[row]), default_bits(ROLES[items.role[row]])
+    pose = {
+        "angle": (items.angles[row], 0),
+        "scale": ([form.scale_x / ONE, form.scale_y / ONE], [1, 1]),
+        "flip": (form.flip, "none"),
+        "frame": (form.frame, 0),
+        "layer": (int(items.layer[row]), 0),
+        "cost": (int(items.cost[row]), 1),
+        "velocity_xy": ((items.velocity_256[row] / SUB).tolist(), [0, 0]),
+        "categories": (scene.category_names(bits), scene.category_names(default)),
+        "owner": (int(items.owner[row]), item),
+    }
+    told = {key: value for key, (value, usual) in pose.items() if value != usual}
+    xy = (items.position_256[row] / SUB).tolist()
+    return {"id": item, "name": items.names[row], **source, "position_xy": xy, **told}
+
+
+def _saved_categories(scene: Scene) -> list[str]:
+    """Names of the categories from bit 1 on, up to the last that the scene names or an object is saved with."""
+    items, rows = scene.items, scene.items.rows
+    default = np.where(items.role[rows] == OCCLUDER, ALL, 1)
+    used = items.categories[rows][items.categories[rows] != default]
+    count = max(len(scene.categories), int(used.max(initial=0)).bit_length())
+    return scene.category_names((1 << count) - 1)[1:]
 
 
 def _saved_source(sprite: Sprite, folder: Path, images: dict[str, str | None]) -> dict[str, Any]:
@@ -417,43 +428,18 @@ def _digest(image: Image) -> str:
     return hashlib.sha256(repr(image.shape).encode() + image.tobytes()).hexdigest()
 
 
-def load_scene(folder: str | Path) -> Scene:
-    """Read a scene folder, scene.json and the PNGs that it names, given its path or that of its scene.json.
-
-    Weapons and shots of the file are kept as plain JSON in `scene.weapons` and `scene.shots`.
-
-    Raises
-    ------
-    InputError
-        With the names of the file, the section, the row and the field.
-    """
-    path = scene_folder(path_of("folder", folder))
-    file = read_scene(path)
-    with within(str(path / FILE_NAME)):
-        x, y = file.origin_xy
-        scene = Scene(file.size_wh, (x, y), categories=file.categories, name=file.name)
-        scene.weapons, scene.shots = file.weapons, file.shots
-        numbered = [entry.id is not None for entry in file.objects]
-        if any(numbered) and not all(numbered):
-            raise InputError("objects: expected an id for each object or for none, got some")
-        entries = sorted(file.objects, key=lambda entry: entry.id) if any(numbered) else file.objects  # type: ignore[arg-type,return-value]
-        for entry in entries:
-            _add_entry(scene, entry)
-        _set_owners(scene, entries)
-        return scene
-
-
-def _add_entry(scene: Scene, entry: FileObject) -> None:
-    with within(entry.place):
-        if entry.id is not None:
-            if entry.id < scene.items.count:
-                raise InputError(f"id: expected each id once, got {entry.id} again")
-            scene.items.table.skip_to(entry.id)
-        options = {"role": entry.role, "name": entry.name, "categories": entry.categories, **entry.pose}
-        scene.add(entry.sprite, entry.position_xy, **options)
-
-
-def _set_owners(scene: Scene, entries: Sequence[FileObject]) -> None:
+def _add_entries(scene: Scene, entries: Sequence[Entry]) -> None:
+    numbered = [entry.id is not None for entry in entries]
+    if any(numbered) and not all(numbered):
+        raise InputError("objects: expected an id for each object or for none, got some")
+    entries = sorted(entries, key=lambda entry: entry.id or 0)
+    for entry in entries:
+        with within(entry.place):
+            if entry.id is not None:
+                if entry.id < scene.items.count:
+                    raise InputError(f"id: expected each id once, got {entry.id} again")
+                scene.items.table.skip_to(entry.id)
+            scene.add(**entry.options)
     for item, entry in zip(scene.ids().tolist(), entries, strict=True):
         if entry.owner is not None:
             with within(f"{entry.place}: owner"):
@@ -463,24 +449,19 @@ def _set_owners(scene: Scene, entries: Sequence[FileObject]) -> None:
                 scene.set(item, owner=owner)
 
 
-def empty_folder(folder: Path) -> bool:
-    """Make a folder unless it exists and is empty; return whether it was made."""
+@contextmanager
+def new_folder(folder: Path) -> Iterator[list[Path]]:
+    """Make a folder unless it exists and is empty; after an error, remove it and the files that are listed."""
+    made, files = False, list[Path]()
     with possible(f"folder: cannot make {folder}"), suppress(FileExistsError):
         folder.mkdir()
-        return True
+        made = True
     if not folder.is_dir():
         raise InputError(f"folder: expected a new folder, got the file {folder}")
     with possible(f"folder: cannot read {folder}"):
         held = sorted(path.name for path in folder.iterdir())
     if held:
         raise InputError(f"folder: expected a new or empty folder, got {folder} with {held[0]!r} in it")
-    return False
-
-
-@contextmanager
-def new_folder(folder: Path) -> Iterator[list[Path]]:
-    """Make a folder unless it exists and is empty; after an error, remove it and the files that are listed."""
-    made, files = empty_folder(folder), list[Path]()
     try:
         yield files
     except BaseException:

@@ -30,6 +30,7 @@ ROLES = tuple(Role)
 DECIDING = Role.HITTABLE, Role.OCCLUDER
 HITTABLE, OCCLUDER = map(ROLES.index, DECIDING)
 ROLE_NAMES = tuple(role.value for role in ROLES)
+PLANE_NAMES = ("background", "hittable", "movers", "occluders", "hud")  # of the planes of ROLES, in order
 
 GROWTH_MOST = 2**20  # most ids that room is made for ahead
 NAMELESS = -1 - len(ROLES)

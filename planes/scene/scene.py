@@ -33,13 +33,12 @@ from ..grid.fixed_point import snap
 from ..grid.spans import Box
 from .derived import Derived
 from .items import Items
-from .objects import ROLE_NAMES, ROLES, Role
+from .objects import PLANE_NAMES, ROLE_NAMES, ROLES, Role
 from .poses import are_rows, one_place, place_256, points, scale_pair
 from .sprite import Sprite, as_sprite
 from .variants import transform_of
 
 if TYPE_CHECKING:
-    from ..files.scene_folder import FileObject
     from ..volumes.volumes import Volumes
     from .carving import HitPixels
     from .render import Planes
@@ -47,7 +46,6 @@ if TYPE_CHECKING:
 
 Read = TypeVar("Read", bound=np.generic)
 
-FIELDS = ("background", "hittable", "movers", "occluders", "hud")  # names of the planes of ROLES, in order
 DEFAULT_CATEGORY = "default"  # name of the first category bit, which objects have by default
 
 
@@ -100,7 +98,7 @@ class Scene:
             (h, w, 3 or 4) bytes, an image
         origin_xy : pixel of the world at [0, 0]
         """
-        given = dict(zip(FIELDS, (background, hittable, movers, occluders, hud), strict=True))
+        given = dict(zip(PLANE_NAMES, (background, hittable, movers, occluders, hud), strict=True))
         arrays = {field: array_of(field, plane) for field, plane in given.items() if plane is not None}
         sizes = {field: late.render.plane_size(field, array) for field, array in arrays.items()}
         if len(set(sizes.values())) != 1:
@@ -109,7 +107,7 @@ class Scene:
         scene = cls(next(iter(sizes.values())), origin_xy)
         x, y = integers("origin_xy", origin_xy, (2,), -POSITION_MAX, POSITION_MAX).tolist()
         for field, array in arrays.items():
-            role = ROLES[FIELDS.index(field)]
+            role = ROLES[PLANE_NAMES.index(field)]
             in_picture = role is Role.HUD
             for name, sprite, left, top in late.render.plane_objects(field, role.value, array):
                 scene.add(sprite, (left, top) if in_picture else (x + left, y + top), role=role, name=name)
@@ -184,7 +182,7 @@ class Scene:
         return {
             "role": ROLES.index(role),
             "layer": integer("layer", layer, -LAYER_MAX, LAYER_MAX),
-            "categories": self._bits(categories, _default_bits(role)),
+            "categories": self._bits(categories, default_bits(role)),
             "owner": self._items.count if owner is None else integer("owner", owner, 0, self._items.count),
             "cost": integer("cost", cost, 0, COST_MAX),
             "position_256": place_256("position_xy", position_xy, POSITION_MAX),
@@ -275,7 +273,7 @@ class Scene:
         """Columns of a new role; objects that have the default categories of the old role get those of the new one."""
         old = np.where(self._items.role[rows] == ROLES.index(Role.OCCLUDER), ALL, 1)
         now = self._items.categories[rows]
-        return {"role": ROLES.index(role), "categories": np.where(now == old, _default_bits(role), now)}
+        return {"role": ROLES.index(role), "categories": np.where(now == old, default_bits(role), now)}
 
     def ids(self, role: Role | str | None = None) -> Ints:
         """Ids of the objects in the scene, rising, of one role or of all."""
@@ -436,7 +434,7 @@ class Scene:
         box = self.extent()
         x, y, x_max, y_max = box
         out: dict[str, npt.NDArray[np.int32]] = {}
-        for field, role in zip(FIELDS, ROLES, strict=True):
+        for field, role in zip(PLANE_NAMES, ROLES, strict=True):
             at = (0, 0, x_max - x, y_max - y) if role is Role.HUD else box
             out[field] = late.label_plane.id_plane(self.items.stack_of(role), at)
             out[field].flags.writeable = False
@@ -462,16 +460,7 @@ class Scene:
         Text().check("name", self.name)
         typed("weapons", self.weapons, dict)
         typed("shots", self.shots, list)
-        objects = [self._file_object(row) for row in self.items.rows.tolist()]
-        x, y, x_max, y_max = self.bounds or (0, 0, 0, 0)
-        size = None if self.bounds is None else (x_max - x + 1, y_max - y + 1)
-        names = self._bit_names()
-        used = [names.index(name) + 1 for entry in objects for name in entry.categories or ()]
-        names = names[1 : max([len(self.categories), *used])]
-        late.scene_folder.write_scene(
-            path_of("folder", folder),
-            late.scene_folder.SceneFile(self.name, (x, y), size, names, objects, self.weapons, self.shots),
-        )
+        late.scene_folder.write_scene(path_of("folder", folder), self)
 
     def _bit_names(self) -> list[str]:
         """A distinct name for every category bit."""
@@ -482,35 +471,6 @@ class Scene:
                 name += "'"
             names.append(name)
         return names
-
-    def _file_object(self, row: int) -> FileObject:
-        items, form = self.items, self.items.forms[row]
-        one = 1 << SCALE_BITS
-        pose: dict[str, Any] = {}
-        if items.angles[row]:
-            pose["angle"] = items.angles[row]
-        if (form.scale_x, form.scale_y) != (one, one):
-            pose["scale"] = [form.scale_x / one, form.scale_y / one]
-        if form.flip != "none":
-            pose["flip"] = form.flip
-        if form.frame:
-            pose["frame"] = form.frame
-        if items.layer[row]:
-            pose["layer"] = int(items.layer[row])
-        if items.cost[row] != 1:
-            pose["cost"] = int(items.cost[row])
-        if items.velocity_256[row].any():
-            pose["velocity_xy"] = (items.velocity_256[row] / SUB).tolist()
-        role = ROLES[int(items.role[row])]
-        bits, owner = int(items.categories[row]), int(items.owner[row])
-        x, y = (items.position_256[row] / SUB).tolist()
-        categories = None
-        if bits != _default_bits(role):
-            categories = self.category_names(bits)
-        part_of = None if owner == items.id[row] else owner
-        return late.scene_folder.FileObject(
-            role, items.sprites[row], (x, y), pose, items.names[row], categories, part_of, int(items.id[row])
-        )
 
     def _risen(self, ids: object) -> Ints | None:
         """Rows of an array of rising ids (n,) that are all in the scene; None for any other value."""
@@ -577,7 +537,8 @@ def _role(role: object) -> Role:
     return Role(choice("role", role, ROLE_NAMES))
 
 
-def _default_bits(role: Role) -> int:
+def default_bits(role: Role) -> int:
+    """Category bits of an object that is given none."""
     return ALL if role is Role.OCCLUDER else 1
 
 
