@@ -1,6 +1,7 @@
-"""Forms of JSON values: a form checks a value, and writes itself as JSON Schema (draft 2020-12).
+"""Forms of JSON values, which check them.
 
-A scene file, a weapon, a shot and a report each have one table of such forms.
+A scene file, a weapon, a shot and a report each have one table of such forms. `tests/bench/schemas.py` makes JSON
+Schemas of the tables.
 """
 
 from __future__ import annotations
@@ -30,9 +31,6 @@ class Value(Protocol):
     def check(self, name: str, value: object) -> Any:
         """Return the value as plain Python, or raise InputError that begins with its name."""
 
-    def schema(self) -> dict[str, Any]:
-        """The form as JSON Schema."""
-
 
 @dataclass(frozen=True)
 class Number:
@@ -45,10 +43,6 @@ class Number:
         """Check one number."""
         return real(name, value, self.low, self.high)
 
-    def schema(self) -> dict[str, Any]:
-        """A number and its limits."""
-        return {"type": "number", **_limits(self.low, self.high)}
-
 
 @dataclass(frozen=True)
 class Whole:
@@ -60,10 +54,6 @@ class Whole:
     def check(self, name: str, value: object) -> int:
         """Check one whole number."""
         return integer(name, value, self.low, self.high)
-
-    def schema(self) -> dict[str, Any]:
-        """An integer and its limits."""
-        return {"type": "integer", **_limits(self.low, self.high)}
 
 
 @dataclass(frozen=True)
@@ -88,11 +78,6 @@ class Numbers:
                 real(f"{name}[{i}]", number, self.low, self.limit)
         return _tuples(array.tolist())
 
-    def schema(self) -> dict[str, Any]:
-        """Arrays in arrays."""
-        low = -self.limit if self.low is None else self.low
-        return _nested(self.shape, Number(low, self.limit).schema(), self.least)
-
 
 @dataclass(frozen=True)
 class Wholes:
@@ -108,10 +93,6 @@ class Wholes:
             return ()
         return _tuples(integers(name, value, self.shape, self.low, self.high).tolist())
 
-    def schema(self) -> dict[str, Any]:
-        """Arrays in arrays."""
-        return _nested(self.shape, Whole(self.low, self.high).schema(), 0)
-
 
 @dataclass(frozen=True)
 class Text:
@@ -126,10 +107,6 @@ class Text:
         ):
             raise InputError(f"{name}: expected a text of 1 to {TEXT_MAX} characters, got {shown(value)}")
         return value
-
-    def schema(self) -> dict[str, Any]:
-        """A string and its limits."""
-        return {"type": "string", "minLength": 1, "maxLength": TEXT_MAX}
 
 
 def inside(name: str, value: object) -> str:
@@ -153,10 +130,6 @@ class Names:
             raise InputError(f"{name}: expected distinct names, got {shown(names)}")
         return names
 
-    def schema(self) -> dict[str, Any]:
-        """An array of strings."""
-        return {"type": "array", "items": Text().schema(), "uniqueItems": True}
-
 
 @dataclass(frozen=True)
 class Word:
@@ -167,10 +140,6 @@ class Word:
     def check(self, name: str, value: object) -> str:
         """Check one word; the error suggests the nearest."""
         return choice(name, value, self.words)
-
-    def schema(self) -> dict[str, Any]:
-        """An enumeration."""
-        return {"enum": list(self.words)}
 
 
 @dataclass(frozen=True)
@@ -186,10 +155,6 @@ class Const:
             raise InputError(f"{name}: expected {self.value!r}, got {shown(value)}")
         return value
 
-    def schema(self) -> dict[str, Any]:
-        """A constant, or a few."""
-        return {"enum": [self.value, *self.older]} if self.older else {"const": self.value}
-
 
 @dataclass(frozen=True)
 class Flag:
@@ -198,10 +163,6 @@ class Flag:
     def check(self, name: str, value: object) -> bool:
         """Check one boolean."""
         return flag(name, value)
-
-    def schema(self) -> dict[str, Any]:
-        """A boolean."""
-        return {"type": "boolean"}
 
 
 @dataclass(frozen=True)
@@ -221,11 +182,6 @@ class Mask:
                 raise InputError(f"{name}[{i}]: expected {len(value[0])} of '#' and '.', got {shown(row)}")
         return self.check(name, [[v == "#" for v in row] for row in value])
 
-    def schema(self) -> dict[str, Any]:
-        """Rows of either kind; a schema cannot say that all rows have one length."""
-        rows = {"type": "array", "items": {"type": "string", "pattern": "^[#.]+$"}, "minItems": 1}
-        return {"anyOf": [rows, _nested((None, None), {"enum": [0, 1, True, False]}, 1)]}
-
 
 @dataclass(frozen=True)
 class Optional:
@@ -236,10 +192,6 @@ class Optional:
     def check(self, name: str, value: object) -> Any:
         """Check a value that is not null."""
         return None if value is None else self.form.check(name, value)
-
-    def schema(self) -> dict[str, Any]:
-        """Either of them."""
-        return {"anyOf": [self.form.schema(), {"type": "null"}]}
 
 
 @dataclass(frozen=True)
@@ -254,10 +206,6 @@ class Either:
         """Check the value by the form that its type selects."""
         return (self.first if isinstance(value, self.kind) else self.second).check(name, value)
 
-    def schema(self) -> dict[str, Any]:
-        """Either of them."""
-        return {"anyOf": [self.first.schema(), self.second.schema()]}
-
 
 @dataclass(frozen=True)
 class OneOrEach:
@@ -271,10 +219,6 @@ class OneOrEach:
         several = isinstance(value, list | tuple) and value and isinstance(value[0], list | tuple)
         return (self.each if several else self.one).check(name, value)
 
-    def schema(self) -> dict[str, Any]:
-        """Either of them."""
-        return {"anyOf": [self.one.schema(), self.each.schema()]}
-
 
 @dataclass(frozen=True)
 class Rows:
@@ -286,10 +230,6 @@ class Rows:
         """Check each row."""
         rows = value if isinstance(value, tuple) else typed(name, value, list)
         return tuple(self.form.check(f"{name}[{i}]", row) for i, row in enumerate(rows))
-
-    def schema(self) -> dict[str, Any]:
-        """An array."""
-        return {"type": "array", "items": self.form.schema()}
 
 
 @dataclass(frozen=True)
@@ -303,10 +243,6 @@ class Mapped:
         for key in typed(name, value, dict):
             Text().check(f"{name}: key", key)
         return {key: self.form.check(f"{name}.{key}", entry) for key, entry in typed(name, value, dict).items()}
-
-    def schema(self) -> dict[str, Any]:
-        """An object."""
-        return {"type": "object", "propertyNames": Text().schema(), "additionalProperties": self.form.schema()}
 
 
 @dataclass(frozen=True)
@@ -326,15 +262,6 @@ class Keys:
                 raise InputError(f"{key}: expected {_phrase(self.forms[key])}, got nothing")
         return {key: self.forms[key].check(key, entry) for key, entry in data.items()}
 
-    def schema(self) -> dict[str, Any]:
-        """An object and no further keys."""
-        shown: dict[str, Any] = {
-            "type": "object",
-            "properties": {key: form.schema() for key, form in self.forms.items()},
-            "additionalProperties": False,
-        }
-        return {**shown, "required": list(self.needed)} if self.needed else shown
-
 
 @dataclass(frozen=True)
 class Within:
@@ -347,10 +274,6 @@ class Within:
         with within(name):
             return self.form.check(name, value)
 
-    def schema(self) -> dict[str, Any]:
-        """The schema of the form inside."""
-        return self.form.schema()
-
 
 @dataclass(frozen=True)
 class Ref:
@@ -361,10 +284,6 @@ class Ref:
     def check(self, name: str, value: object) -> Any:
         """Return the value unchecked."""
         return value
-
-    def schema(self) -> dict[str, Any]:
-        """A reference."""
-        return {"$ref": f"#/$defs/{self.definition}"}
 
 
 def json_of(text: str) -> Any:
@@ -402,19 +321,6 @@ def _phrase(form: Value) -> str:
     if isinstance(form, Numbers) and form.shape == (2,):
         return "two numbers"
     return repr(form.value) if isinstance(form, Const) else "a value"
-
-
-def _limits(low: float, high: float) -> dict[str, Any]:
-    limits = {"minimum": low, "maximum": high}
-    return {key: limit for key, limit in limits.items() if math.isfinite(limit)}
-
-
-def _nested(shape: Shape, item: dict[str, Any], least: int) -> dict[str, Any]:
-    for n in reversed(shape):
-        item = {"type": "array", "items": item}
-        if n is not None:
-            item |= {"minItems": n, "maxItems": n}
-    return item | {"minItems": least} if least else item
 
 
 def _tuples(value: Any) -> Any:
