@@ -57,11 +57,11 @@ polygons = st.lists(ring_points, min_size=1, max_size=3)
 
 
 def beam(a: Point, b: Point, radius: int) -> Spans:
-    return rasterize.beam(np.array(a), np.array(b), radius)
+    return rasterize.beams(np.array(a), np.array([b]), radius).spans()
 
 
 def segment(a: Point, b: Point) -> Spans:
-    return rasterize.segment(np.array(a), np.array(b))
+    return beam(a, b, 0)
 
 
 def polygon(*rings: list[Point]) -> Spans:
@@ -69,7 +69,7 @@ def polygon(*rings: list[Point]) -> Spans:
 
 
 def cone(reach: int, axis: Point, half_degrees: float) -> Spans:
-    return rasterize.cone(reach, *axis, *oracle.unit(half_degrees))
+    return rasterize.cones(reach, np.array([axis]), *oracle.unit(half_degrees)).spans()
 
 
 def pixel_set(spans: Spans) -> Pixels:
@@ -370,9 +370,8 @@ def test_moves_by_whole_pixels(family: str, far_px: int) -> None:
 def test_inputs_are_left_alone() -> None:
     a, b, ring = np.array([3, 700]), np.array([-900, 5]), np.array([[0, 0], [900, 30], [40, 1000]])
     copies = [v.copy() for v in (a, b, ring)]
-    rasterize.segment(a, b)
-    rasterize.segment(b, a)
-    rasterize.beam(a, b, 200)
+    rasterize.beams(a, b[None], 0).spans()
+    rasterize.beams(b, a[None], 200).spans()
     rasterize.polygon([ring, ring])
     assert all(np.array_equal(v, copy) for v, copy in zip((a, b, ring), copies, strict=True))
 
@@ -776,7 +775,7 @@ def test_a_flat_ellipse_of_a_million_pixels() -> None:
 
 def test_a_long_narrow_cone() -> None:
     axis, half = oracle.unit(0.001), oracle.unit(0.0004)
-    spans = rasterize.cone(FAR, *axis, *half)
+    spans = rasterize.cones(FAR, np.array([axis]), *half).spans()
     for x in (0, 1, 10, 1000, 65_537, 2**20 - 1, 2**20):
         middle = round(x * math.radians(0.001))
         for y in range(middle - 12, middle + 13):

@@ -19,7 +19,7 @@ from ..common.backend import kernels_of
 from ..common.checks import Bools, Floats, InputError, Ints, all_within, rising
 from ..common.limits import HALF, POSITION_MAX, SUB, TRIG_BITS
 
-UNIT = 1 << TRIG_BITS  # 1 as a component of a direction
+ONE = 1 << TRIG_BITS  # 1 as a component of a direction
 DOUBT = 2.0**-12  # a scaled sine nearer to a tie is in doubt; float sines err by a few ulp, 2**-21 after the scaling
 
 
@@ -31,7 +31,7 @@ def nearest(degrees: Floats) -> tuple[Ints, Ints, Ints]:
     """
     rest, steep, left, down = _folded(degrees)
     radians = np.radians(rest)
-    near, far = np.cos(radians) * UNIT, np.sin(radians) * UNIT
+    near, far = np.cos(radians) * ONE, np.sin(radians) * ONE
     whole_near, whole_far = np.rint(near), np.rint(far)
     doubt = np.maximum(np.abs(near - whole_near), np.abs(far - whole_far)) > 0.5 - DOUBT
     x, y = whole_near.astype(np.int64), whole_far.astype(np.int64)
@@ -52,7 +52,6 @@ def _folded(degrees: Floats | float) -> tuple[Floats, Bools, Bools, Bools]:
     return np.where(steep, 90 - folded, folded), steep, left, np.asarray(down ^ (np.asarray(degrees) < 0))
 
 
-ONE = 1 << TRIG_BITS
 Whole = TypeVar("Whole", int, Ints)
 _PI = (31415926535897932384626433832795028841971693993751, 10**49)
 _FIXED_BITS = 160  # as exact as _PI
@@ -165,8 +164,7 @@ def all_quarters(direction: Ints) -> tuple[Ints, Ints, Ints]:
     return k, c, s
 
 
-FEW_ANGLES = 8
-"""Most angles that are split one by one."""
+FEW_ANGLES = 8  # most angles that are split one by one
 
 
 @lru_cache(maxsize=ANGLES_KEPT)
@@ -189,12 +187,7 @@ def all_quarter_turns(degrees: Sequence[float]) -> list[list[int]]:
     """`quarter_turns` of angles, as three columns."""
     if 0 < len(degrees) <= FEW_ANGLES:  # an array costs more
         return [list(column) for column in zip(*map(quarter_turns, degrees), strict=True)]
-    c, s = unit(degrees)
-    quarter = np.zeros(len(c), np.int64)
-    for _ in range(3):
-        more = (s < -c) | (s >= c)
-        quarter, c, s = quarter + more, np.where(more, s, c), np.where(more, -c, s)
-    return [quarter.tolist(), c.tolist(), s.tolist()]
+    return [column.tolist() for column in all_quarters(np.stack(unit(degrees), axis=1))]
 
 
 def unit_of(degrees: float) -> tuple[int, int]:
@@ -257,28 +250,9 @@ def _over_length(component: int, squared_length: int) -> int:
     return int(math.copysign((twice + 1) // 2, component))
 
 
-LIMIT, SCALE = np.array(float(POSITION_MAX)), np.array(float(SUB))
-
-ROUNDING = np.array(1.5 * 2.0**52)  # a float64 of this size has no fraction: a number added is rounded, half to even
-
-ROUNDING_BITS = ROUNDING.view(np.int64)
-"""Bits of ROUNDING: subtracted from the bits of the sum they leave that whole number, twice as fast as a conversion."""
-
-
 def snapped(at: Floats) -> Ints | None:
     """Positions (N, 2) in px, rounded to 1/256 px as `snap` does; None if any is NaN or out of range."""
-    if not (at.max(initial=0) <= LIMIT and at.min(initial=0) >= -LIMIT):  # false if any is NaN
-        return None
-    made = at * SCALE
-    made += ROUNDING
-    whole: Ints = made.view(np.int64)
-    whole -= ROUNDING_BITS
-    return whole
-
-
-def pixels(at_256: Ints) -> Ints:
-    """Pixels (N, 2) that hold positions in 1/256 px; see `pixel`."""
-    return pixel(at_256)
+    return snap(at) if all_within(at, -POSITION_MAX, POSITION_MAX) else None
 
 
 def place(

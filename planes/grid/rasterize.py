@@ -24,10 +24,8 @@ import numpy.typing as npt
 
 from ..common.checks import Bools, Floats, Ints
 from ..common.limits import HALF, SUB, TRIG_BITS
-from .fixed_point import UNIT, far_roots, isqrt, turned
+from .fixed_point import ONE, far_roots, isqrt, turned
 from .spans import WIDEST, RowRuns, Spans, each_pixel, in_rows, ragged
-
-Runs = tuple[Ints, Ints, Ints]
 
 QUOTIENT_ERROR = 2.0**-50  # most relative error of a quotient of two numbers, rounded to float64, times a row number
 
@@ -35,7 +33,7 @@ QUOTIENT_ERROR = 2.0**-50  # most relative error of a quotient of two numbers, r
 def disc(radius: int) -> Spans:
     """Centres at most `radius` from the origin."""
     y = _rows(-radius, radius)
-    return _union([(y, *_disc_about(np.zeros(2, np.int64), radius, y))])
+    return Spans(y, *_disc_about(np.zeros(2, np.int64), radius, y))
 
 
 def ring(inner: int, outer: int) -> Spans:
@@ -46,7 +44,8 @@ def ring(inner: int, outer: int) -> Spans:
     # The hole is open: the first centre outside it has x * x >= rest, so x >= the root rounded up.
     root = isqrt(np.maximum(rest, 0))
     hole = np.where(rest > 0, root + (root * root < rest), 0)
-    return _union([_closed(y, -edge, -hole), _closed(y, hole, edge)])
+    first, last = -(-hole // SUB), edge // SUB
+    return Spans.from_runs(np.tile(y, 2), np.append(-last, first), np.append(-first, last))
 
 
 def ellipse(radius_x: int, radius_y: int, c: int, s: int) -> Spans:
@@ -142,16 +141,12 @@ def convex_polygons(points: Ints) -> RowRuns | None:
     return RowRuns(shape, y, [(first, last)])
 
 
-def beam(a: Ints, b: Ints, radius: int) -> Spans:
-    """Centres at most `radius` from the segment ab, and the closed supercover of ab."""
-    return beams(np.asarray(a), np.array([b]), radius).spans()
-
-
 def beams(a: Ints, b: Ints, radius: int) -> RowRuns:
-    """Beams from one point (2,) to several (n, 2); see `beam`. Its own rows are a disc at each end and what is between.
+    """Centres at most `radius` from segments from one point (2,) to several (n, 2), and the segments' supercovers.
 
-    These three are parts of a convex set, so the first and the last of their pixels bound all of a row. The axis adds
-    nothing to a beam that is as wide as a pixel's diagonal.
+    The rows of a beam are those of a disc at each end and of what is between. These three are parts of a convex set, so
+    the first and the last of their pixels bound all of a row. The supercover adds nothing to a beam that is as wide as
+    a pixel's diagonal.
     """
     step = b - a
     low, high = np.minimum(a[1], b[:, 1]), np.maximum(a[1], b[:, 1])
@@ -186,13 +181,8 @@ def sides_of(radius: int, step: Ints) -> Ints:
     return np.array([math.isqrt(radius * radius * n) for n in length2.tolist()], np.int64)
 
 
-def cone(reach: int, c: int, s: int, c_half: int, s_half: int) -> Spans:
-    """Centres within `reach` and within the half angle of the direction (c, s), and the supercover of the axis."""
-    return cones(reach, np.array([[c, s]]), c_half, s_half).spans()
-
-
 def cones(reach: int, direction: Ints, c_half: int, s_half: int) -> RowRuns:
-    """Cones along several directions (n, 2); see `cone`.
+    """Centres within `reach` and within the half angle of directions (n, 2), and the supercovers of the axes.
 
     With u = x c + y s and v = y c - x s: |v| c_half <= u s_half. Up to 90 degrees correctly rounded cosines fall and
     sines rise with the half angle, so a wider cone covers a narrower one.
@@ -220,15 +210,8 @@ def _sector_ends(reach: int, c: Ints, s: Ints, c_half: int, s_half: int) -> tupl
     """Least and greatest y of sectors about the origin, rounded outward."""
     one, other = s * c_half - c * s_half, s * c_half + c * s_half
     low, high = (end(end(one, other) >> TRIG_BITS, 0) for end in (np.minimum, np.maximum))
-    low, high = np.where(-s >= c_half, -UNIT, low), np.where(s >= c_half, UNIT, high)
+    low, high = np.where(-s >= c_half, -ONE, low), np.where(s >= c_half, ONE, high)
     return (reach * low >> TRIG_BITS) - 1, (reach * high >> TRIG_BITS) + 2
-
-
-def segment(a: Ints, b: Ints) -> Spans:
-    """Closed supercover of a segment: every pixel whose closed square touches it; the ends may be swapped."""
-    a, b = np.asarray(a), np.asarray(b)
-    y = _rows(min(a[1], b[1]) - HALF, max(a[1], b[1]) + HALF)
-    return _union([(y, *_axis_rows(a, np.array([b - a]), np.zeros_like(y), y))])
 
 
 def _axis_rows(a: Ints, step: Ints, shape: Ints, y: Ints) -> tuple[Ints, Ints]:
@@ -272,20 +255,9 @@ def _or_nothing(first: Ints, last: Ints, none: Bools) -> tuple[Ints, Ints]:
     return np.where(none, WIDEST, first), np.where(none, -WIDEST, last)
 
 
-def _union(parts: Sequence[Runs]) -> Spans:
-    """Merge all runs at once."""
-    y, x_first, x_last = (np.concatenate(column) for column in zip(*parts, strict=True))
-    return Spans.from_runs(y, x_first, x_last)
-
-
 def _rows(low: int, high: int) -> Ints:
     """Rows whose centres lie in [low, high]."""
     return np.arange(-(-low // SUB), high // SUB + 1, dtype=np.int64)
-
-
-def _closed(y: Ints, low: Ints, high: Ints) -> Runs:
-    """Centres of rows y from low to high."""
-    return y, -(-low // SUB), high // SUB
 
 
 def _ragged_rows(first: Ints, last: Ints) -> tuple[Ints, Ints]:

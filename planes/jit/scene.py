@@ -11,7 +11,7 @@ from numba import types
 
 from ..common.checks import Floats, Ints
 from ..common.limits import GOLDEN, HALF, POSITION_MAX, SUB, TRIG_BITS
-from ..grid.fixed_point import DOUBT, UNIT
+from ..grid.fixed_point import DOUBT, ONE
 from ..grid.rasterize import DIAGONAL, ROOM, sides_of
 from ..grid.spans import WIDEST, RowRuns
 from .bit_rows import INTS, OUT
@@ -47,7 +47,7 @@ def _nearest(degrees, cosine, sine, doubt):
         for k in range(TERMS - 1, -1, -1):
             near = near * (x * x) + COSINE[k]
         far *= x
-        c, s = (far if steep else near) * UNIT, (near if steep else far) * UNIT
+        c, s = (far if steep else near) * ONE, (near if steep else far) * ONE
         c, s = -c if left else c, -s if down ^ (degrees[i] < 0) else s
         whole_c, whole_s = np.rint(c), np.rint(s)
         cosine[i], sine[i] = np.int32(whole_c), np.int32(whole_s)
@@ -79,19 +79,6 @@ def snapped(at: Floats) -> Ints | None:
     return whole if _snapped(at.ravel(), whole.ravel()) else None
 
 
-@compiled(types.void(INTS, types.int64[::1]))
-def _pixels(at_256, whole):
-    for i in range(len(at_256)):
-        whole[i] = (at_256[i] + HALF) >> 8
-
-
-def pixels(at_256: Ints) -> Ints:
-    """See `grid.fixed_point.pixels`."""
-    whole = np.empty(at_256.shape, np.int64)
-    _pixels(at_256.ravel(), whole.ravel())
-    return whole
-
-
 PELLETS = types.Array(types.int64, 2, "A", readonly=True)
 STEPS = types.Array(types.int64, 3, "A", readonly=True)
 PARTS = types.int64[:, :, ::1]
@@ -101,7 +88,7 @@ WHOLE = types.int64
 @helper(inline="always")
 def _over_one(value):
     """See `fixed_point.over_one`."""
-    return (value + (UNIT // 2 - 1) + ((value >> TRIG_BITS) & 1)) >> TRIG_BITS
+    return (value + (ONE // 2 - 1) + ((value >> TRIG_BITS) & 1)) >> TRIG_BITS
 
 
 @compiled(PARTS(PELLETS, PELLETS))
@@ -456,8 +443,8 @@ def _cones(reach, direction, c_half, s_half):
     for k in range(count):
         c, s = direction[k]
         one, other = s * c_half - c * s_half, s * c_half + c * s_half
-        least = -UNIT if -s >= c_half else min(min(one, other) >> TRIG_BITS, 0)
-        most = UNIT if s >= c_half else max(max(one, other) >> TRIG_BITS, 0)
+        least = -ONE if -s >= c_half else min(min(one, other) >> TRIG_BITS, 0)
+        most = ONE if s >= c_half else max(max(one, other) >> TRIG_BITS, 0)
         top[k] = ((reach * least >> TRIG_BITS) - 1 - HALF) // SUB
         low[k] = _ceil((reach * most >> TRIG_BITS) + 2 + HALF, SUB)
     shape, y, begin = layout(top, low)

@@ -103,8 +103,7 @@ class Shots:
     @cached_attribute
     def xy(self) -> Ints:
         """Whole pixels (N, 2) of the positions."""
-        xy: Ints = kernels_of(fixed_point).pixels(self.at_256)
-        return xy
+        return pixel(self.at_256)
 
     @property
     def one_direction(self) -> tuple[int, int] | None:
