@@ -146,7 +146,7 @@ def test_columns_have_as_many_rows_as_there_were_objects_at_once() -> None:
     assert (table.count, table.height, table.living) == (500, 21, 20)
     assert scene.ids().tolist() == list(range(480, 500))
     assert scene.position(scene.ids())[:, 0].tolist() == list(range(480, 500))
-    assert max(len(getattr(scene.items, name)) for name in ("alive", "sprites", "names", "_box")) <= 32
+    assert max(len(getattr(scene.items, name)) for name in ("id", "sprites", "names", "_box")) <= 32
     assert scene.copy().items.table.height == 20
 
 

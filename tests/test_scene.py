@@ -58,7 +58,7 @@ def state(scene: Scene) -> list[Any]:
     items = scene.items
     masks = [pixels(scene, i) for i in scene.ids().tolist()]
     columns = [
-        getattr(items, c)[: items.table.height].tolist() for c in ("alive", "role", "layer", "categories", "owner")
+        getattr(items, c)[: items.table.height].tolist() for c in ("size_wh", "role", "layer", "categories", "owner")
     ]
     lists = [len(v) for v in (items.sprites, items.forms, items.angles, items.variants, items.names)]
     return [items.count, len(scene), items.version, masks, columns, list(items.angles), list(items.forms), lists]

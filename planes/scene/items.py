@@ -6,13 +6,12 @@ import itertools
 import threading
 from collections import deque
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from struct import Struct
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from .. import late
 from ..common.backend import kernels_of
@@ -55,23 +54,10 @@ class Stack:
         vars(self).update(state, forms=next(ARRANGEMENTS))
 
     def placed(self, box_xyxy: Ints) -> Stack:
-        """A stack of the same items in the same order at other places; both share the other columns."""
-        return self._with(("sizes",), box_xyxy=box_xyxy)  # boxes keep their sizes, and pixels their numbers
-
-    def reformed(self, forms: int, box_xyxy: Ints, offset: Ints, masks: Bools, categories: Ints, owner: Ints) -> Stack:
-        """A stack of the same ids in the same order with other masks, categories or owners."""
-        return self._with(
-            ("sizes", "width", "numbers", "has_unmet"), forms=forms, box_xyxy=box_xyxy, offset=offset, masks=masks,
-            categories=categories, owner=owner,
-        )  # fmt: skip
-
-    def _with(self, stale: tuple[str, ...], **columns: object) -> Stack:
-        """A stack with some columns replaced; it shares the rest and all cached properties that are not stale."""
+        """A stack of the same items in the same order at other places; they share the rest, but for cached `sizes`."""
         stack = object.__new__(Stack)
-        vars(stack).update(vars(self))
-        for name in stale:
-            vars(stack).pop(name, None)
-        vars(stack).update(columns)
+        vars(stack).update(vars(self), box_xyxy=box_xyxy)
+        vars(stack).pop("sizes", None)
         return stack
 
     def __len__(self) -> int:
@@ -150,11 +136,7 @@ class Stack:
 
 def _is_there(boxes: Ints | Box) -> bool:
     """Whether any of some boxes (n, 4), or a single box, holds a pixel."""
-    if isinstance(boxes, tuple):
-        return boxes[0] <= boxes[2]
-    if not len(boxes):
-        return False
-    return bool(boxes[0, 0] <= boxes[0, 2] or (boxes[:, 0] <= boxes[:, 2]).any())  # the first tells most often
+    return boxes[0] <= boxes[2] if isinstance(boxes, tuple) else bool((boxes[:, 0] <= boxes[:, 2]).any())
 
 
 NOWHERE = (0, 0, -1, -1)
@@ -178,19 +160,26 @@ ROWS_SLACK = 1024  # rows without an item that are kept, beside as many as there
 ARRANGEMENTS = itertools.count(1)  # source of numbers of arrangements; each of items of any scene has its own
 
 COLUMNS: dict[str, tuple[int, ...]] = {
-    "id": (), "alive": (), "role": (), "layer": (), "categories": (), "owner": (), "cost": (),
+    "id": (), "role": (), "layer": (), "categories": (), "owner": (), "cost": (),
     "position_256": (2,), "velocity_256": (2,), "pivot_256": (2,), "size_wh": (2,), "offset": (), "mask": (),
 }  # fmt: skip
 
 UNARRANGED = frozenset(("position_256", "velocity_256", "cost"))  # columns whose change leaves the arrangement as it is
-ORDERING = frozenset(("alive", "role", "layer"))  # columns whose change may reorder items, or which of them decide hits
+ORDERING = frozenset(("role", "layer"))  # columns whose change may reorder items, or which of them decide hits
+
+
+def _rows_without_items(count: int) -> dict[str, Ints]:
+    """So many rows of all columns."""
+    rows = {name: np.zeros((count, *shape), np.int64) for name, shape in COLUMNS.items()}
+    return rows | {"_box": np.full((count, 4), NOWHERE), "_edge": np.full((count, 4), NO_EDGE)}
 
 
 class Items:
     """The items of a scene as columns and lists, which have a row for each item; `table` has the row of each id."""
 
+    _box: Ints  # (n, 4) `deciding_boxes`
+    _edge: Ints  # (n, 4) from the position to the first and last pixel of the box, 1/256 px
     id: Ints
-    alive: Ints
     role: Ints
     layer: Ints
     categories: Ints
@@ -227,10 +216,7 @@ class Items:
         self._allot()
 
     def _allot(self) -> None:
-        for name, shape in COLUMNS.items():
-            setattr(self, name, np.zeros((16, *shape), np.int64))
-        self._box = np.tile(np.array(NOWHERE), (16, 1))
-        self._edge = np.tile(NO_EDGE, (16, 1))  # from the position to the first and last pixel of the box, 1/256 px
+        vars(self).update(_rows_without_items(16))
 
     def add(self, sprite: Sprite, form: Transform, angle: float, name: str, values: dict[str, object]) -> int:
         """Add an item with its columns `values`, and return its id; its mask is made later."""
@@ -241,7 +227,7 @@ class Items:
         self.sprites[row], self.forms[row], self.angles[row], self.names[row] = sprite, form, angle, name
         for column, value in values.items():
             getattr(self, column)[row] = value
-        self.id[row], self.alive[row] = item, 1
+        self.id[row] = item
         self.arrangement, self._in_order = next(ARRANGEMENTS), False  # the row may be one of an item of the last stack
         self._make_later([row])
         return item
@@ -250,7 +236,7 @@ class Items:
         """What a copy is made of: columns and lists with a row for each item by rising id, and the table of them."""
         ids, rows = self._known()
         columns: dict[str, Any] = {name: getattr(self, name) for name in COLUMNS}
-        if len(self.alive) > len(rows) or (rows != np.arange(len(rows))).any():  # pickles store equal objects once
+        if len(self.id) > len(rows) or (rows != np.arange(len(rows))).any():  # pickles store equal objects once
             columns = {name: column.take(rows, axis=0) for name, column in columns.items()}
         lists = {name: [getattr(self, name)[row] for row in rows.tolist()] for name in (*Looks._fields, "names")}
         return columns | lists | {"table": self.table.copied(ids, self.count)}
@@ -302,7 +288,7 @@ class Items:
 
     def remove(self, rows: Ints) -> None:
         """Remove items; their ids are not used again, but their rows are."""
-        self.alive[rows] = 0
+        self.size_wh[rows] = 0
         self._make_later(rows.tolist())
         for row, item in zip(rows.tolist(), self.id[rows].tolist(), strict=True):
             if self.variants[row] is NO_MASK and not _is_there(tuple(self._box[row].tolist())):  # it was never seen
@@ -427,11 +413,8 @@ class Items:
         seen, decided = self._decided
         if seen != self.version:
             changes = self.changes(seen)
-            last = self.version if changes is None else decided
-            for version, _, before, after in changes or ():
-                if _is_there(before) or _is_there(after):
-                    last = version
-                    break
+            seen_in = (version for version, _, *boxes in changes or () if any(map(_is_there, boxes)))
+            last = self.version if changes is None else next(seen_in, decided)
             self._decided = self.version, last
         return self._decided[1]
 
@@ -456,7 +439,7 @@ class Items:
         corner = pixel(self.position_256.take(rows, axis=0) - self.pivot_256.take(rows, axis=0))
         size = self.size_wh.take(rows, axis=0)
         boxes = np.concatenate([corner, corner + size - 1], axis=1)
-        boxes[(self.alive[rows] == 0) | (size[:, 0] == 0)] = NOWHERE
+        boxes[size[:, 0] == 0] = NOWHERE
         return boxes
 
     def corner(self, row: int) -> tuple[int, int]:
@@ -503,9 +486,10 @@ class Items:
         if last is None or not self._in_order:
             return self.stack_of(*DECIDING)
         rows = last.rows
-        places = self._boxes_in_order(rows), self.offset.take(rows)
-        columns = self._filtered_by(rows, last.occluder), self.owner.take(rows)
-        return last.reformed(self.arrangement, *places, self.atlas.flat, *columns)
+        return replace(
+            last, forms=self.arrangement, box_xyxy=self._boxes_in_order(rows), offset=self.offset.take(rows),
+            masks=self.atlas.flat, categories=self._filtered_by(rows, last.occluder), owner=self.owner.take(rows),
+        )  # fmt: skip
 
     def _filtered_by(self, rows: Ints, occluder: Bools) -> Ints:
         """Categories of a stack's items."""
@@ -582,14 +566,7 @@ class Items:
         """Make room for `count` rows."""
         for name, empty in EMPTY.items():
             getattr(self, name).extend([empty] * (count - len(getattr(self, name))))
-        size = len(self.alive)
-        if count <= size:
-            return
-        more = max(count - size, size // 4)
-        self._box = np.concatenate([self._box, np.tile(np.array(NOWHERE), (more, 1))])
-        self._edge = np.concatenate([self._edge, np.tile(NO_EDGE, (more, 1))])
-        for name in COLUMNS:
-            old: npt.NDArray[np.int64] = getattr(self, name)
-            grown = np.zeros((size + more, *old.shape[1:]), np.int64)
-            grown[:size] = old
-            setattr(self, name, grown)
+        size = len(self.id)
+        if count > size:
+            for name, spare in _rows_without_items(max(count - size, size // 4)).items():
+                setattr(self, name, np.concatenate([getattr(self, name), spare]))

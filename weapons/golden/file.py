@@ -155,7 +155,7 @@ def check_present(hits: object) -> Hits:
         return hits
     rows = scene.items.changed_rows(hits.version)
     gone = [item for item in hits._stack.ids.tolist() if item not in scene]
-    there = [] if rows is None else scene.items.id[rows[scene.items.alive[rows] == 1]].tolist()
+    there = [] if rows is None else scene.items.id[np.intersect1d(rows, scene.items.rows)].tolist()
     ids = sorted({*there, *gone})
     names = [f"{item} {json.dumps(scene.name_of(item))}" for item in ids[:CHANGED_MAX]]
     more = f" and {len(ids) - CHANGED_MAX} more" if len(ids) > CHANGED_MAX else ""
