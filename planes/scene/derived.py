@@ -68,8 +68,6 @@ class View(NamedTuple):
 
     def accepts(self, stack: Stack) -> Bools:
         """Which items (M,) of a stack such shots accept."""
-        if not self.may_refuse(stack):
-            return np.ones(len(stack), np.bool_)
         there = (stack.categories & self.meets) != 0
         for owner in self.exclude:
             there &= stack.owner != owner
