@@ -167,8 +167,8 @@ def _between(a: Ints, step: Ints, radius: int, shape: Ints, y: Ints) -> tuple[In
     side = sides_of(radius, step)
     v = SUB * y - a[1]
     along, across = (a[0] * dx)[shape] - dy[shape] * v, (a[0] * dy)[shape] + dx[shape] * v
-    first, last = _slab(along, along + length2[shape], dx[shape])
-    begin, end = _slab(across - side[shape], across + side[shape], dy[shape])
+    first, last = runs_between(along, along + length2[shape], dx[shape])
+    begin, end = runs_between(across - side[shape], across + side[shape], dy[shape])
     first, last = np.maximum(first, begin), np.minimum(last, end)
     return _or_nothing(first, last, (first > last) | (length2 == 0)[shape])
 
@@ -217,17 +217,8 @@ def _sector_ends(reach: int, c: Ints, s: Ints, c_half: int, s_half: int) -> tupl
 def _axis_rows(a: Ints, step: Ints, shape: Ints, y: Ints) -> tuple[Ints, Ints]:
     """Runs of the supercovers of segments from a point (2,), in rows of shapes; empty in rows that they do not meet."""
     (dx, dy), (x0, y0) = np.ascontiguousarray(step.T), a.tolist()
-    per, slope = np.maximum(np.abs(dy), 1), dx * np.sign(dy)
-    base, top, low = (x0 * per - y0 * slope)[shape], SUB * y - HALF, SUB * y + HALF
-    np.maximum(top, (y0 + np.minimum(dy, 0))[shape], out=top)
-    np.minimum(low, (y0 + np.maximum(dy, 0))[shape], out=low)
-    none = top > low
-    enter, leave = base + top * slope[shape], base + low * slope[shape]
-    if not dy.all():
-        leave += np.where(dy == 0, dx, 0)[shape]
-    cell = (SUB * per)[shape]
-    half = cell >> 1
-    return _or_nothing(-((half - np.minimum(enter, leave)) // cell), (np.maximum(enter, leave) + half) // cell, none)
+    first, last = _thin_runs(x0, y0, dx, dy, shape, y)
+    return _or_nothing(first, last, first > last)
 
 
 def _disc_rows(x: Ints, level: Ints, radius: int) -> tuple[Ints, Ints]:
@@ -266,13 +257,15 @@ def _ragged_rows(first: Ints, last: Ints) -> tuple[Ints, Ints]:
     return shape, first[shape] + place
 
 
-def _slab(low: Ints, high: Ints, slope: Ints) -> tuple[Ints, Ints]:
+def runs_between(low: Ints, high: Ints, slope: Ints) -> tuple[Ints, Ints]:
     """Runs of the centres with low <= slope * x <= high, x in 1/256 px."""
     low, high = np.where(slope < 0, -high, low), np.where(slope < 0, -low, high)
     per, level = SUB * np.maximum(np.abs(slope), 1), slope == 0
-    none, all_ = level & ((low > 0) | (high < 0)), level & (low <= 0) & (high >= 0)
     first, last = -(-low // per), high // per
-    return _or_nothing(np.where(all_, -WIDEST, first), np.where(all_, WIDEST, last), none)
+    if level.any():
+        none = level & ((low > 0) | (high < 0))
+        first, last = _or_nothing(np.where(level, -WIDEST, first), np.where(level, WIDEST, last), none)
+    return first, last
 
 
 def _half_plane(slope: Ints, limit: Ints, shape: Ints, y: Ints) -> tuple[Ints, Ints]:
@@ -420,15 +413,8 @@ class Lines:
 
     def _thick_runs(self, u: Ints, v: Ints, along: Ints, aside: Ints, line: Ints, row: Ints) -> tuple[Ints, Ints]:
         """Cells at most `wide_sides` from the infinite axes of segments, in rows."""
-        side, per, level = self.wide_sides, np.maximum(np.abs(aside), 1), aside == 0
-        middle = (u * per - v * along * np.sign(aside))[line] + row * (SUB * along * np.where(aside < 0, -1, 1))[line]
-        cell = (SUB * per)[line]
-        first, last = -((side[line] - middle) // cell), (middle + side[line]) // cell
-        if level.any():
-            beside = np.abs((SUB * row - v[line]) * along[line]) > side[line]
-            first, last = np.where(level[line], -WIDEST, first), np.where(level[line], WIDEST, last)
-            first = np.where(level[line] & beside, WIDEST, first)
-        return first, last
+        across, side = (u * aside - v * along)[line] + (SUB * along)[line] * row, self.wide_sides[line]
+        return runs_between(across - side, across + side, aside[line])
 
     def times(self, line: Ints, x: Ints, y: Ints) -> tuple[Ints, Ints]:
         """Times at which segments enter and leave cells; a cell that is not touched is left before it is entered."""
@@ -512,7 +498,7 @@ class Lines:
         return np.array([math.isqrt(square) for square in squares.tolist()], np.int64)
 
 
-def _thin_runs(u: Ints, v: Ints, along: Ints, aside: Ints, line: Ints, row: Ints) -> tuple[Ints, Ints]:
+def _thin_runs(u: Ints | int, v: Ints | int, along: Ints, aside: Ints, line: Ints, row: Ints) -> tuple[Ints, Ints]:
     """First and last cell of thin segments in rows; the last is less in a row that is not touched."""
     per, slope, level = np.maximum(np.abs(aside), 1), along * np.sign(aside), aside == 0
     enter = np.maximum(SUB * row - HALF, np.minimum(v, v + aside)[line])

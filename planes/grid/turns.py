@@ -10,6 +10,7 @@ import numpy.typing as npt
 from ..common.checks import Bools, Ints
 from ..common.limits import HALF, SUB, TRIG_BITS
 from .fixed_point import pixel
+from .rasterize import runs_between
 from .spans import RowRuns, each_pixel, in_rows, ragged, rectangles
 
 
@@ -72,16 +73,7 @@ def turned_runs(edges: Edges, quarter: Ints, c: Ints, s: Ints) -> RowRuns:
     run, row = each_pixel(first_row, last_row)
     c, s, (x, y) = c[run], s[run], pivot[run].T
     down = SUB * row - y
-    first, last = _between(c, (left[run] << TRIG_BITS) - down * s + x * c, (right[run] << TRIG_BITS) - down * s + x * c)
-    sides = (down * c - (low[run] << TRIG_BITS) + x * s, down * c - (top[run] << TRIG_BITS) + x * s)
-    from_, to = _between(s, *sides)
-    return in_rows(aim[run], row, np.maximum(first, from_), np.minimum(last, to))
-
-
-def _between(per_256: Ints, low: Ints, high: Ints) -> tuple[Ints, Ints]:
-    """First and last whole number k with low <= k * 256 * per_256 <= high.
-
-    If that is 0 the mask is not turned, and no bound is nearer to 0 than 2**37: they hold all k of a mask, or none.
-    """
-    per, back = SUB * np.maximum(np.abs(per_256), 1), per_256 < 0
-    return -(-np.where(back, -high, low) // per), np.where(back, -low, high) // per
+    across = [(side[run] << TRIG_BITS) - down * s + x * c for side in (left, right)]
+    along = [down * c - (side[run] << TRIG_BITS) + x * s for side in (low, top)]
+    (first, last), (begin, end) = runs_between(across[0], across[1], c), runs_between(along[0], along[1], s)
+    return in_rows(aim[run], row, np.maximum(first, begin), np.minimum(last, end))
