@@ -907,7 +907,9 @@ def check_cells(rays: list[tuple[Pixel, Pixel]], shift: Pixel = (0, 0)) -> int:
         leave += [row[3] for row in rows]
         scales.append(scale)
     ends = np.array(rays, np.int64) + 256 * np.array(shift)
-    found = rasterize.cells(ends[:, 0], ends[:, 1])
+    *cells, scale = rasterize.cells_of(ends[:, 0], ends[:, 1])
+    order = np.lexsort((cells[1][:, 0], cells[1][:, 1], cells[2], cells[0]))
+    found = *(column[order] for column in cells), scale
     truth = (ray, np.array(xy) + np.array(shift), entry, leave, scales)
     for name, column, true in zip(("ray", "xy", "entry", "exit", "scale"), found, truth, strict=True):
         np.testing.assert_array_equal(column, true, err_msg=name)
@@ -958,11 +960,11 @@ def test_cells_of_the_longest_rays() -> None:
 
 def test_cells_of_no_rays() -> None:
     none = np.zeros((0, 2), np.int64)
-    assert [len(column) for column in rasterize.cells(none, none)] == [0] * 5
+    assert [len(column) for column in rasterize.cells_of(none, none)] == [0] * 5
 
 
 def test_inputs_are_left_as_they_were() -> None:
     ends = np.array([[[0, 0], [700, -300]], [[128, 128], [128, 128]]], np.int64)
     kept = ends.copy()
-    rasterize.cells(ends[:, 0], ends[:, 1])
+    rasterize.cells_of(ends[:, 0], ends[:, 1])
     np.testing.assert_array_equal(ends, kept)

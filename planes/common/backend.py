@@ -203,12 +203,9 @@ class LruCache(Generic[Key, Value]):
                     self.values.move_to_end(key)
             if not missing:
                 return cast(list[Value], found)
-            made = make(list(missing.values()))
-            for key, value in zip(missing, made, strict=True):
+            fresh = dict(zip(missing, make(list(missing.values())), strict=True))
+            for key, value in fresh.items():
                 self._keep(key, value)
-            if len(missing) == len(keys):
-                return list(made)
-            fresh = dict(zip(missing, made, strict=True))
             return [fresh[key] if value is None else value for key, value in zip(keys, found, strict=True)]
 
     def _keep(self, key: Key, made: Value) -> Value:

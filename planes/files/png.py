@@ -85,9 +85,8 @@ def read_png(path: str | Path, field: str = "image") -> Image:
         If the file is missing, is not a PNG, is damaged, or is larger than a mask may be.
     """
     path = path_of(field, path)
-    data = _contents(path, field)
+    header, data = _contents(path, field)
     with within(f"{field}: {path.name!r}"):
-        header = _header(data, len(data))
         chunks = _chunks(header, data)
         _check_pixels(header, chunks[b"IDAT"])
         return _rgba(header, _decoded(header, chunks[b"IDAT"]), chunks)
@@ -125,15 +124,13 @@ def write_png(path: str | Path, image: Image) -> None:
         If the array is not an image, or the file cannot be written.
     """
     path = path_of("output", path)
-    if not (
-        isinstance(image, np.ndarray) and image.dtype == np.uint8 and image.size and image.shape[2:] in ((3,), (4,))
-    ):
-        got = f"{image.dtype} {image.shape}" if isinstance(image, np.ndarray) else shown(image)
+    is_array = isinstance(image, np.ndarray)
+    if not (is_array and image.dtype == np.uint8 and image.size and image.shape[2:] in ((3,), (4,))):
+        got = f"{image.dtype} {image.shape}" if is_array else shown(image)
         raise InputError(f"image: expected bytes (h, w, 3 or 4), got {got}")
     if max(image.shape) > PLANE_SIDE_MAX:
-        raise InputError(
-            f"image: expected sides of at most {PLANE_SIDE_MAX} px, got {image.shape[1]} x {image.shape[0]}"
-        )
+        got = f"{image.shape[1]} x {image.shape[0]}"
+        raise InputError(f"image: expected sides of at most {PLANE_SIDE_MAX} px, got {got}")
     order = cv2.COLOR_RGB2BGR if image.shape[2] == 3 else cv2.COLOR_RGBA2BGRA
     flat = [cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_DEFAULT, cv2.IMWRITE_PNG_COMPRESSION, 6]
     _, data = cv2.imencode(".png", cv2.cvtColor(image, order), flat)  # a third of the size of OpenCV's default
@@ -214,8 +211,8 @@ def _synced_folder(folder: Path) -> None:
             raise
 
 
-def _contents(path: Path, field: str) -> bytes:
-    """Bytes of a file; only its start is read if that is not the start of a PNG within the limits."""
+def _contents(path: Path, field: str) -> tuple[_Header, bytes]:
+    """Header and bytes of a file; only its start is read if that is not the start of a PNG within the limits."""
     what = f"{field}: expected a PNG file, got {path.name!r}"
     with possible(what):
         if path.exists() and not path.is_file():
@@ -224,10 +221,10 @@ def _contents(path: Path, field: str) -> bytes:
             start = file.read(START)
             size = path.stat().st_size
             with within(f"{field}: {path.name!r}"):
-                _header(start, size)
+                header = _header(start, size)
             if size > FILE_BYTES_MAX:
                 raise InputError(f"{what} of {size} bytes, more than any that a mask may come from")
-            return start + file.read()
+            return header, start + file.read()
 
 
 def _header(start: bytes, size: int) -> _Header:

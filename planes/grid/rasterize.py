@@ -512,13 +512,6 @@ def _thin_runs(u: Ints | int, v: Ints | int, along: Ints, aside: Ints, line: Int
     return first, np.where(none, first - 1, last)
 
 
-def cells(start_256: Ints, end_256: Ints, radius_256: int = 0) -> tuple[Ints, Ints, Ints, Ints, Ints]:
-    """`cells_of` segments in the order in which they are entered: sorted by (segment, entry, y, x)."""
-    line, xy, entry, leave, scale = cells_of(start_256, end_256, radius_256)
-    order = np.lexsort((xy[:, 0], xy[:, 1], entry, line))
-    return line[order], xy[order], entry[order], leave[order], scale
-
-
 def cells_of(start_256: Ints, end_256: Ints, radius_256: int = 0) -> tuple[Ints, Ints, Ints, Ints, Ints]:
     """Cells of segments (n, 2), up to 2**48 and of half a width, all in 1/256 px, in any order.
 

@@ -375,15 +375,13 @@ class Scene:
 
     def find(self, name: str) -> int:
         """Id of the object of a name; it must be the only one."""
-        every = self._items.names
-        if isinstance(name, str) and name and every.count(name) == 1:
-            return int(self._items.id[every.index(name)])
-        names = {i: self._items.name_of(i) for i in self.ids().tolist()}
-        choice("name", name, names.values())
-        named = [i for i, other in names.items() if other == name]
-        if len(named) > 1:
-            raise InputError(f"name: expected one object named {name!r}, got {len(named)}")
-        return int(named[0])
+        names = self._items.names
+        count = names.count(name) if isinstance(name, str) and name else 0
+        if not count:
+            choice("name", name, [names[row] for row in self._items.rows.tolist()])
+        if count > 1:
+            raise InputError(f"name: expected one object named {name!r}, got {count}")
+        return int(self._items.id[names.index(name)])
 
     def category_bits(self, *names: str, field: str = "category") -> int:
         """Bits of categories by the names that `category_names` tells; an error says `field`."""

@@ -45,38 +45,32 @@ def check_size(name: str, width: int, height: int) -> None:
         raise InputError(f"{name}: expected {limit}, got {width} x {height}")
 
 
-UIDS = itertools.count()
+UIDS = itertools.count()  # numbers of sprites and of their masks, unique in this process
 
 OUTLINE_MARGIN = 2  # pixels around a shape: scaled to 1/256, its points are rounded by up to 1 px of it as it was made
 
 
-class Known:
-    """An object with a number `uid` that is unique in this process; a copy, even an unpickled one, gets its own."""
+class ReadOnly:
+    """An object whose arrays are read-only; so are those of a copy."""
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Copy the fields, but take a new number: the old one may be in use in this process."""
         vars(self).update(state)
-        vars(self)["uid"] = next(UIDS)
+        for value in state.values():
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
 
 
 @dataclass(frozen=True)
-class Frame:
+class Frame(ReadOnly):
     """A frame of a sprite: the mask (h, w), the image (h, w, 4) that it was made of, if any, and a pivot of its own."""
 
     mask: Bools
     image: Image | None = None
     pivot_256: tuple[int, int] | None = None
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        """Copy the arrays, and make them read-only again."""
-        vars(self).update(state)
-        for array in (self.mask, self.image):
-            if array is not None:
-                array.flags.writeable = False
-
 
 @dataclass(frozen=True, eq=False)
-class Carving:
+class Carving(ReadOnly):
     """What was carved out of a frame or a shape: cells that are gone. It is flipped, scaled and turned with the sprite.
 
     A turned or enlarged sprite loses parts of its pixels, so a pixel has several cells.
@@ -84,11 +78,6 @@ class Carving:
 
     gone: Bools  # (h * per_px, w * per_px) cells of the pixels of `local_grid`, True where nothing is left
     per_px: int = 1  # number of cells along a pixel, a power of two
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        """Copy the array, and make it read-only again."""
-        vars(self).update(state)
-        self.gone.flags.writeable = False
 
 
 @dataclass(frozen=True)
@@ -100,7 +89,7 @@ class Outline:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Sprite(Known):
+class Sprite:
     """The look and the mask of an object: frames of image and mask, or one shape. The class methods make sprites.
 
     `source` is its entry in a scene file, as JSON, or None. `carvings` has what `Scene.carve` took out of frames, by
@@ -122,6 +111,10 @@ class Sprite(Known):
         if not (isinstance(self.frames, tuple) and all(isinstance(frame, Frame) for frame in self.frames)):
             how = "Sprite.from_mask and Sprite.from_image make sprites of arrays"
             raise InputError(f"frames: expected a tuple of frames, got {shown(self.frames)}: {how}")
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Copy the fields, but take a new number: the old one may be in use in this process."""
+        vars(self).update(state, uid=next(UIDS))
 
     def __repr__(self) -> str:
         sizes = [f"{frame.mask.shape[1]} x {frame.mask.shape[0]} px" for frame in self.frames]

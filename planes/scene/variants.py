@@ -38,19 +38,7 @@ from ..grid.fixed_point import over_one, quarter_turns, rounded_div, turned
 from ..grid.rasterize import ellipse
 from ..grid.spans import Spans
 from ..grid.turns import quarter_turned
-from .sprite import (
-    UIDS,
-    Known,
-    Outline,
-    Sprite,
-    check_size,
-    fits,
-    frame_number,
-    frame_pivot,
-    frozen,
-    local_grid,
-    size_of,
-)
+from .sprite import UIDS, Outline, Sprite, check_size, fits, frame_number, frame_pivot, frozen, local_grid, size_of
 
 Ints32 = npt.NDArray[np.int32]
 
@@ -117,7 +105,7 @@ def surely_fits(sprite: Sprite, form: Transform) -> bool:
 
 
 @dataclass(eq=False)  # a frozen one takes six times as long to make
-class Variant(Known):
+class Variant:
     """The mask of a sprite in one pose, cropped and read-only, with its pivot in 1/256 px from the centre of [0, 0]."""
 
     form: Transform

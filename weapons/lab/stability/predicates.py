@@ -17,7 +17,7 @@ import numpy.typing as npt
 from hitplanes.planes.broadphase.triangles import triangles_meet
 from hitplanes.planes.common.checks import Bools
 from hitplanes.planes.common.limits import SUB
-from hitplanes.planes.grid.rasterize import cells as cells_of_rays
+from hitplanes.planes.grid.rasterize import cells_of
 from hitplanes.planes.scene.scene import Scene
 from hitplanes.planes.scene.sprite import Sprite
 from hitplanes.planes.volumes.overlap import contains_point, overlap
@@ -317,7 +317,7 @@ def _point_polygon(rings: Array, points: Array) -> Bools:
 
 
 def _ray_cells(start: Array, end: Array, cells: Array) -> Bools:
-    ray, met, *_ = cells_of_rays(start, end)
+    ray, met, *_ = cells_of(start, end)
     found = np.zeros(len(cells), np.bool_)
     found[ray[(met == cells[ray]).all(axis=1)]] = True
     return found
