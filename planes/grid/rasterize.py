@@ -296,15 +296,13 @@ def _flat_ellipse(radius_x: int, radius_y: int, c: int, s: int) -> Spans:
     longest = max(radius_x, radius_y)
     if radius_y > radius_x:
         c, s = -s, c
-    if c == 0 or s == 0:
-        y = np.arange(-(longest // SUB), longest // SUB + 1)
-        zero = np.zeros_like(y)
-        return Spans.from_runs(y, zero, zero) if c == 0 else Spans.from_runs(zero[:1], y[:1], y[-1:])
-    y = _rows(-longest, longest)
-    x = y * c // s
-    near = np.abs(x) <= longest // SUB  # in a shallow direction the squares of the others would overflow
-    on = near & (x * s == y * c) & ((SUB * x) ** 2 + (SUB * y) ** 2 <= longest * longest)
-    return Spans.from_runs(y[on], x[on], x[on])
+    steep = abs(s) > abs(c)
+    along, across = (s, c) if steep else (c, s)
+    u = _rows(-longest, longest)
+    v = u * across // along
+    on = (v * along == u * across) & ((SUB * u) ** 2 + (SUB * v) ** 2 <= longest * longest)
+    x, y = (v[on], u[on]) if steep else (u[on], v[on])
+    return Spans.from_runs(y, x, x)
 
 
 DIAGONAL = 182  # half the diagonal of a pixel in 1/256 px, rounded up: no point of a pixel lies farther from its centre
