@@ -106,7 +106,8 @@ def carved(sprite: Sprite, variant: Variant, hole: Hole) -> Sprite:
     columns, rows = (np.arange(max(first, 0), min(last, count)) for (first, last), count in near)
     if len(columns) and len(rows):
         x, y = _pixels_of_cells(form, variant, per_px, pivot, (columns, rows))
-        part = _looked_up(out, x, y)
+        height, width = out.hit.shape  # whose outermost pixels do not go
+        part = out.hit[(y - out.y).clip(0, height - 1), (x - out.x).clip(0, width - 1)]
         gone[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1] |= part
     gone.flags.writeable = False
     made = replace(sprite, carvings={**sprite.carvings, form.frame: Carving(gone, per_px)})
@@ -123,16 +124,6 @@ def _rest_of(variant: Variant, hole: Hole) -> Variant:
     mask.flags.writeable = False
     left = variant.area - int(np.count_nonzero(hole.hit))
     return Variant(variant.form, mask, variant.pivot_x, variant.pivot_y, left)
-
-
-def _looked_up(hole: Hole, x: Ints, y: Ints) -> Bools:
-    """Whether pixels (h, w) of a mask are among those that go."""
-    height, width = hole.hit.shape
-    x, y = x - hole.x, y - hole.y
-    held = np.flatnonzero((x >= 0) & (x < width) & (y >= 0) & (y < height))
-    found = np.zeros(x.shape, np.bool_)
-    found.reshape(-1)[held] = hole.hit[y.take(held), x.take(held)]
-    return found
 
 
 def cells_per_px(form: Transform) -> int:
@@ -155,21 +146,20 @@ def _fine_cells(sprite: Sprite, form: Transform) -> Carving:
     """A copy of the carving of a sprite's frame with cells that are fine enough for a pose."""
     (width, height), _ = local_grid(sprite, form.frame)
     known = sprite.carvings.get(form.frame, Carving(np.zeros((height, width), np.bool_)))
-    finer = max(cells_per_px(form) // known.per_px, 1)
-    size = width * known.per_px * finer, height * known.per_px * finer
-    if not fits(*size):
-        per_px = known.per_px * finer
+    per_px = max(cells_per_px(form), known.per_px)
+    if not fits(width * per_px, height * per_px):
         cut = f"that can be cut into {per_px} x {per_px} cells a px, {MASK_AREA_MAX} in all"
         raise InputError(f"sprite: expected one {cut}, got {width} x {height} px")
+    finer = per_px // known.per_px
     gone = known.gone.copy() if finer == 1 else known.gone.repeat(finer, axis=0).repeat(finer, axis=1)
-    return Carving(gone, known.per_px * finer)
+    return Carving(gone, per_px)
 
 
 def _with_rim(mask: Bools, hole: Hole) -> Hole:
     """A hole with the pixels beside the mask that touch only pixels of the hole.
 
     Cells at the rim of a sprite may lie in pixels that are not in the mask; without the pixels that they touch they
-    would be left as crumbs.
+    would be left as crumbs. The hole gets a border of pixels that do not go.
     """
     x, y = hole.x - 2, hole.y - 2
     goes = np.pad(hole.hit, 2)
