@@ -43,7 +43,8 @@ from hitplanes.planes.grid.fixed_point import snap
 from hitplanes.planes.scene import history as history_module
 from hitplanes.planes.scene import items as items_module
 from hitplanes.planes.scene import variants as variants_module
-from hitplanes.planes.scene.items import COLUMNS
+from hitplanes.planes.scene.items import COLUMNS, Items, Stack
+from hitplanes.planes.scene.objects import Role
 from hitplanes.planes.scene.render import draw_view
 from hitplanes.planes.volumes.volumes import Circles
 
@@ -590,7 +591,7 @@ def test_the_stack_is_kept_with_the_moment() -> None:
     assert history.at(0).items.stack() is stack
 
 
-def test_the_order_of_a_moment_is_found_once() -> None:
+def test_the_order_of_a_moment_is_found_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Also of one at which nobody fired, and between two, whose items are made anew for each reader."""
     scene = yard(5)
     scene.remove([1])
@@ -598,11 +599,17 @@ def test_the_order_of_a_moment_is_found_once() -> None:
     for x in range(3):
         scene.move([0], (x, 0))
         history.record()
-    kept = [moment.snapshot for moment in history._moments.values()]
-    assert [items.order for items in kept] == [None] * 3
-    history.at(0.5).items.stack()
-    history.at(2).items.stack()
-    assert [items.order is None for items in kept] == [False, True, False]
+    assert [moment.snapshot.order for moment in history._moments.values()] == [None] * 3
+    stack_of, versions = Items.stack_of, []
+
+    def counted(items: Items, *roles: Role) -> Stack:
+        versions.append(items.version)
+        return stack_of(items, *roles)
+
+    monkeypatch.setattr(Items, "stack_of", counted)
+    for tick in (0.5, 0.25, 0, 2, 2, 0.75):
+        history.at(tick).items.stack()
+    assert len(versions) == len(set(versions)) == 2
 
 
 def test_volumes_of_masks_are_made_once(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -23,7 +23,7 @@ from ..common.limits import HISTORY_TICKS_MAX, SUB, TICK_MAX
 from ..grid.fixed_point import rounded_div
 from ..grid.spans import Box
 from .derived import NEVER, Derived
-from .items import ARRANGEMENTS, COLUMNS, EMPTY, NO_BOXES, UNARRANGED, Items, Stack
+from .items import ARRANGEMENTS, COLUMNS, EMPTY, NO_BOXES, UNARRANGED, Items
 from .objects import RowTable, looked_up
 from .scene import Scene
 from .variants import MaskAtlas, variant_of, variants_of
@@ -83,7 +83,7 @@ class Snapshot:
         if after is self:
             return self.items()
         if self.order is None:
-            self.items().stack()
+            self.order = self.items().stack().placed(NO_BOXES)
         rows, later = self._in_both(after)
         own, position = copy.copy(self), self.columns["position_256"].copy()
         step = after.columns["position_256"][later] - position[rows]
@@ -157,13 +157,6 @@ class PastItems(Items):
 
     def _boxes_in_order(self, rows: Ints) -> Ints:
         return self.boxes(rows)
-
-    def stack(self) -> Stack:
-        """See `Items.stack`; its order is kept for those who read the moment later."""
-        stack = super().stack()
-        if self._snapshot.order is None:
-            self._snapshot.order = stack.placed(NO_BOXES)
-        return stack
 
     def turn(self, angles: Mapping[int, float]) -> None:
         """Set the angles of items by their rows, and their masks."""
