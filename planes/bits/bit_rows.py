@@ -33,19 +33,10 @@ def packed(masks: Sequence[Bools]) -> Words:
 
 
 def rows_of(words: npt.NDArray[Kind], height: int, begin: Ints) -> npt.NDArray[Kind]:
-    """Rows (n, height) of a flat array, from places (n,) on."""
-    return rows_at(every_stretch(words, height), begin, height, words.dtype)
-
-
-def every_stretch(words: npt.NDArray[Any], height: int) -> npt.NDArray[np.void]:
-    """All stretches of `height` numbers of an array, each as one value; picking them takes half the time of rows."""
-    kind = np.dtype((np.void, words.itemsize * height))
-    return np.ndarray((len(words) - height + 1,), kind, words, 0, words.strides)
-
-
-def rows_at(every: npt.NDArray[np.void], begin: Ints, height: int, kind: np.dtype[Kind]) -> npt.NDArray[Kind]:
-    """Stretches from places (n,) on, as rows (n, height)."""
-    return np.asarray(every[begin].view(kind)).reshape(len(begin), height)
+    """Rows (n, height) of a flat array, from places (n,) on; each stretch is picked as one value."""
+    stretch = np.dtype((np.void, words.itemsize * height))
+    every = np.ndarray((len(words) - height + 1,), stretch, words, 0, words.strides)
+    return np.asarray(every[begin].view(words.dtype)).reshape(len(begin), height)
 
 
 _BIT = np.uint64(1)
@@ -116,8 +107,6 @@ WORDS_AT_ONCE = 2**16
 """Words of pairs worked on at a time: 512 KB; with fewer, calls take longer, with more, the caches overflow."""
 
 _FULL = np.uint64(2**64 - 1)
-_BYTES = np.uint64(0x00FF00FF00FF00FF)
-_SUM = np.uint64(0x0001000100010001)
 
 
 class PatternBits(NamedTuple):
@@ -227,11 +216,11 @@ def take_away(rows: Words, words: Words, of: Ints, front: Ints, right: Ints) -> 
     right : (m,) columns by which the tile in front lies to the right, -63 .. 63
     """
     height = rows.shape[1]
-    step, every = max(WORDS_AT_ONCE // height, 1), every_stretch(words, height)
+    step = max(WORDS_AT_ONCE // height, 1)
     for first in range(0, len(of), step):
         part = slice(first, first + step)
         own, shift = of[part], right[part]
-        cover = rows_at(every, front[part], height, words.dtype)
+        cover = rows_of(words, height, front[part])
         cover <<= np.maximum(shift, 0).view(np.uint64)[:, None]
         cover >>= np.maximum(-shift, 0).view(np.uint64)[:, None]
         np.invert(cover, out=cover)
@@ -313,12 +302,11 @@ def windows_at(windows: PatternBits, height: int, pattern: Ints | int, left: Int
     """Windows (n, height) of patterns: 64 columns from `left` on, rows from `top` on, relative to their pixel."""
     column = left - (windows.box_xyxy[pattern, 0] - (WORD - 1))
     begin = top - (windows.box_xyxy[pattern, 1] - windows.first[pattern])
-    every, kind = every_stretch(windows.words, height), windows.words.dtype
     shift = (column & (WORD - 1)).view(np.uint64)[:, None]
     column >>= 6
     begin += column * windows.rows[pattern]
-    low = rows_at(every, begin, height, kind)
-    high = rows_at(every, begin + windows.rows[pattern], height, kind)
+    low = rows_of(windows.words, height, begin)
+    high = rows_of(windows.words, height, begin + windows.rows[pattern])
     low >>= shift
     high <<= np.uint64(WORD) - shift
     low |= high
@@ -368,20 +356,3 @@ def row_order(*keys: npt.NDArray[Any]) -> Ints:
 
 FEW_ROWS = 64
 """So few rows are sorted by their keys, as they are: finding out how large those are takes longer."""
-
-
-def sums_of(counts: npt.NDArray[np.uint8]) -> Ints:
-    """Sums (n,) of rows (n, m) of numbers up to 64, eight at a time; m is a multiple of 8 up to 64."""
-    eights = counts.view(np.uint64)
-    total = np.zeros(len(counts), np.uint64)
-    for first in range(0, eights.shape[1], 3):  # the sum of three fits a byte
-        sums = eights[:, first].copy()
-        for column in range(first + 1, min(first + 3, eights.shape[1])):
-            sums += eights[:, column]
-        total += sums & _BYTES
-        sums >>= np.uint64(8)
-        sums &= _BYTES
-        total += sums
-    total *= _SUM
-    total >>= np.uint64(48)
-    return total.astype(np.int64)

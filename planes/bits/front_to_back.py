@@ -17,7 +17,7 @@ from ..common.backend import kernels_of
 from ..common.checks import Bools, Ints
 from ..grid.spans import Box, begins, ragged
 from . import bit_rows
-from .bit_rows import PatternBits, Placed, Words, nearest, row_order, rows_of, sums_of, weights_of
+from .bit_rows import PatternBits, Placed, Words, nearest, row_order, rows_of, weights_of
 from .cells import Cells, listed_at, met_boxes
 
 if TYPE_CHECKING:
@@ -176,14 +176,9 @@ def _near(
     if rule.meets is not None:
         rows = _accepted(tiles, rule.meets, rule.exclude, placement, tile).nonzero()[0]
         placement, tile = placement.take(rows), tile.take(rows)
-    high, low = (_eights(int(np.maximum.reduce(box[3] - box[1], initial=0)) + 1) for box in (sides, windows.box_xyxy.T))
+    high, low = (int(np.maximum.reduce(box[3] - box[1], initial=0)) + 1 for box in (sides, windows.box_xyxy.T))
     top = sides[1].take(tile) if low >= high else asked[1].take(placement)
     return Near(placement, tile, sides[0].take(tile), top), min(high, low)
-
-
-def _eights(rows: int) -> int:
-    """The next multiple of 8, by which rows are counted."""
-    return max(-(-rows // 8) * 8, 8)
 
 
 def _meeting(asked: Ints, sides: Ints, placement: Ints, tile: Ints) -> tuple[Ints, Ints]:
@@ -298,7 +293,7 @@ def _fronts_of_many(tiles: OrderedTiles, near: Near) -> tuple[Ints, Ints, Ints]:
 
 def _counted(placed: Placed, each: int, windows: PatternBits, tiles: OrderedTiles, near: Near, rows: Words) -> TileHits:
     """Hits on objects, from the pixels (n, height) that are left."""
-    samples = sums_of(np.bitwise_count(rows))
+    samples = np.bitwise_count(rows).sum(axis=1, dtype=np.int64)
     if len(tiles.occluder):
         samples[tiles.occluder[near.tile]] = 0
     hit = samples.nonzero()[0]
