@@ -376,11 +376,15 @@ def test_rows_are_cropped_to_their_pixels(seed: int) -> None:
     for pixels, side in zip(tiles, sides.tolist(), strict=True):
         xs, ys = zip(*pixels, strict=True) if pixels else ((), ())
         assert side == ([min(xs), min(ys), max(xs), max(ys)] if pixels else [0, 0, -1, -1])
-    kept = np.array([tile for tile, pixels in enumerate(tiles) if pixels])
-    found = visible.moved(rows, kept, sides[kept], height)
-    for tile, own in zip(kept.tolist(), found.tolist(), strict=True):
-        left, top = sides[tile, :2].tolist()
-        assert {(x + left, y + top) for y, word in enumerate(own) for x in range(64) if word >> x & 1} == tiles[tile]
+    corners = np.array([[rng.randint(-99, 99), rng.randint(-99, 99)] * 2 for _ in tiles])
+    seen = visible.cropped(np.arange(len(tiles)), corners, rows)
+    assert seen.rank.tolist() == [tile for tile, pixels in enumerate(tiles) if pixels]
+    for tile, begin, box in zip(seen.rank.tolist(), seen.begin.tolist(), seen.box_xyxy.tolist(), strict=True):
+        assert box == (sides[tile] + corners[tile]).tolist()
+        left, top, _, low = sides[tile].tolist()
+        for row in range(-WORD, low - top + 1 + WORD):  # what is read before and after it is empty
+            told = pixels_in(seen.words, begin + row, left, top + row, 1)
+            assert told == {(x, y) for x, y in tiles[tile] if y == top + row}
     assert np.array_equal(rows, before)
 
 

@@ -36,24 +36,6 @@ def sides_of(rows: Words) -> Ints:
     return sides
 
 
-def moved(rows: Words, kept: Ints, sides: Ints, height: int) -> Words:
-    """Rows (n, height) of tiles, moved so that the box of their pixels begins in row 0 and column 0.
-
-    Parameters
-    ----------
-    rows : (V, h) rows of all tiles
-    kept : (n,) tiles to move
-    sides : (n, 4) boxes of their pixels, no higher than `height`
-    """
-    step = np.arange(height)
-    inside = step <= (sides[:, 3] - sides[:, 1])[:, None]
-    row = np.where(inside, step + (sides[:, 1] + kept * rows.shape[1])[:, None], 0)
-    found = rows.reshape(-1).take(row)
-    found >>= sides[:, :1].astype(np.uint64)
-    found *= inside
-    return found
-
-
 CELLS_BYTES = 2**25
 """Size of the cache of cells of a visible set, for the last few boxes of patterns, bytes."""
 
@@ -178,7 +160,7 @@ def _rows(tiles: Tiles, boxes_xyxy: Ints, bounds: Box | None, which: Ints, of: I
     which : (V,) the tiles to look at
     of, front : (n,) pairs of a place in `which`, sorted, and a tile that covers it
     """
-    height = -(-int((tiles.inside_xyxy[which, 3] - tiles.inside_xyxy[which, 1]).max(initial=0) + 1) // 8) * 8
+    height = int((tiles.inside_xyxy[which, 3] - tiles.inside_xyxy[which, 1]).max(initial=0)) + 1
     boxes = boxes_xyxy[which]
     right, down = (boxes_xyxy[front, :2] - boxes[of, :2]).T
     rows = bit_rows.rows_of(tiles.words, height, tiles.begin[which])
@@ -199,10 +181,10 @@ def cropped(rank: Ints, boxes_xyxy: Ints, rows: Words) -> OrderedTiles:
     """
     sides = sides_of(rows)
     kept = np.flatnonzero(sides[:, 2] >= 0)
-    sides = sides[kept]
-    height = -(-int((sides[:, 3] - sides[:, 1]).max(initial=0) + 1) // 8) * 8
-    corner = boxes_xyxy[kept, :2]
-    return _laid_out(rank[kept], sides + np.concatenate([corner, corner], axis=1), moved(rows, kept, sides, height))
+    sides, corner = sides[kept], boxes_xyxy[kept, :2]
+    boxes = sides + np.concatenate([corner, corner], axis=1)
+    whole = _laid_out(rank[kept], boxes, rows[kept] >> sides[:, :1].astype(np.uint64))
+    return whole._replace(begin=whole.begin + sides[:, 1])
 
 
 def _laid_out(rank: Ints, boxes_xyxy: Ints, rows: Words) -> OrderedTiles:
