@@ -202,6 +202,16 @@ TOGETHER = WORD + 8  # words of the pixels of a tile that pellets of a round hav
 
 
 @helper()
+def _room_for(pattern_box, following):
+    """Scratch memory for the words of any of the patterns."""
+    longest = 0
+    for kind in range(len(pattern_box)):
+        columns = (62 + pattern_box[kind, 2] - pattern_box[kind, 0] + 1) // 64 + 2
+        longest = max(longest, columns * following[kind])
+    return np.empty(PAD + longest, np.uint64)
+
+
+@helper()
 def lay(windows, first, step, hull, rest):
     """Copy the words of a pattern that tiles may read to `rest`; return their pixels.
 
@@ -301,35 +311,38 @@ def in_row_order(first, last, origin_x, origin_y, out, rank, key, x, y):
 
 
 # house: hit rule of areas
-@helper()
+@compiled(
+    types.UniTuple(types.int64, 3)(
+            types.int64, types.int64, types.int64, ROWS_OUT,
+            *[INTS] * 5, BOXES, INTS, INTS, types.uint64[::1], BOXES, SUMS, INTS,
+            INTS, BOXES, INTS, WORDS, FLAGS, INTS, INTS, *[types.int64] * 5, INTS, INTS,
+            types.boolean, types.UniTuple(types.int64, 4), INTS, OWNERS, types.int64
+    )
+)  # fmt: skip
 def match(
     turn, end, count, out, pattern, x, y, origin_x, origin_y,
     pattern_box, first, following, pattern_words, strips, sums, first_sum,
     rank, box, tile_begin, tiles, occluder, categories, owner, cells_x, cells_y, bits, cells_wide, cells_high,
     begin, listed,
-    pierce, bounds, meets, exclude, each, near, words, row_of, part_of, hit, together,
+    pierce, bounds, meets, exclude, each,
 ):  # fmt: skip
     """Write the rows of rounds `turn` .. `end` - 1 to columns `out`, from row `count` on.
 
     The arguments are the columns of `Placed`, `PatternBits`, `OrderedTiles`, `Cells` and `Rule`.
-
-    Parameters
-    ----------
-    near, words : scratch memory: (T,), and as many words as the largest pattern has
-    row_of, part_of : (M,) and (T,) of -1, for rounds of several pellets
-    hit, together : scratch memory for these: (T,), and TOGETHER words a tile
 
     Returns
     -------
     the round where it stopped for want of room, or -1 if it cannot decide one; rows written; most rows of a round
     """
     room, most, several = out.shape[1], 0, each > 1 and len(box) > 0
+    near, boxes = np.empty(len(box), np.int64), len(box) if several else 0
+    row_of, part_of = np.full(rank[-1] + 1 if several else 0, -1), np.full(boxes, -1)  # of what pellets have hit
+    hit, together = np.empty(boxes, np.int64), np.empty(boxes * TOGETHER, np.uint64)
     bins, binned, grid = begin[:0], listed[:0], begin[:0]
     if not cells_wide and (end - turn) * each > FEW and len(box):
         bins, binned, grid = _binned(box)
     whole = pierce and not len(occluder) and bounds[0] == EVERYWHERE[0]  # nothing is taken away from patterns
-    if whole:
-        words = pattern_words
+    words = pattern_words if whole else _room_for(pattern_box, following)
     ranks, keys, xs, ys = out[RANK], out[KEY], out[X], out[Y]
     while turn < end:
         row, hits, full = count - 1, 0, False
@@ -426,38 +439,6 @@ def match(
     return turn, count, most
 
 
-@compiled(
-    types.UniTuple(types.int64, 3)(
-            types.int64, types.int64, types.int64, ROWS_OUT,
-            *[INTS] * 5, BOXES, INTS, INTS, types.uint64[::1], BOXES, SUMS, INTS,
-            INTS, BOXES, INTS, WORDS, FLAGS, INTS, INTS, *[types.int64] * 5, INTS, INTS,
-            types.boolean, types.UniTuple(types.int64, 4), INTS, OWNERS, types.int64
-    )
-)  # fmt: skip
-def match_rounds(
-    turn, end, count, out, pattern, x, y, origin_x, origin_y,
-    pattern_box, first, following, pattern_words, strips, sums, first_sum,
-    rank, box, tile_begin, tiles, occluder, categories, owner, cells_x, cells_y, bits, cells_wide, cells_high,
-    begin, listed,
-    pierce, bounds, meets, exclude, each,
-):  # fmt: skip
-    """Do what `match` does, with scratch memory of its own."""
-    longest = 0
-    for kind in range(len(first)):
-        longest = max(longest, ((62 + pattern_box[kind, 2] - pattern_box[kind, 0] + 1) // 64 + 2) * following[kind])
-    near, words = np.empty(len(box), np.int64), np.empty(PAD + longest, np.uint64)
-    boxes = len(box) if each > 1 else 0
-    row_of, part_of = np.full(rank[-1] + 1 if boxes else 0, -1), np.full(boxes, -1)
-    hit, together = np.empty(boxes, np.int64), np.empty(boxes * TOGETHER, np.uint64)
-    return match(
-        turn, end, count, out, pattern, x, y, origin_x, origin_y,
-        pattern_box, first, following, pattern_words, strips, sums, first_sum,
-        rank, box, tile_begin, tiles, occluder, categories, owner, cells_x, cells_y, bits, cells_wide, cells_high,
-        begin, listed,
-        pierce, bounds, meets, exclude, each, near, words, row_of, part_of, hit, together,
-    )  # fmt: skip
-
-
 NONE = np.zeros(0, np.int64)
 NOBODY = np.zeros((1, 0), np.int64)
 NOWHERE = Cells(0, 0, 0, 0, 0, NONE, NONE)
@@ -479,7 +460,7 @@ def front_to_back(
         tiles_each = len(tiles.rank) if near is None else LISTED * len(cells.listed) / max(len(cells.begin) - 1, 1)
         least = COMPILED.thread / (each * (COMPILED.tiles_placement + COMPILED.tiles_pair * tiles_each))
         found = rows_by(
-            match_rounds, Y + 1, len(placed.origin_x), least,
+            match, Y + 1, len(placed.origin_x), least,
             *placed, *windows, *tiles, *cells, rule.pierce, EVERYWHERE if rule.bounds is None else rule.bounds,
             accepted, NOBODY if rule.exclude is None else rule.exclude, each,
         )  # fmt: skip

@@ -26,20 +26,7 @@ from hitplanes.planes.common.limits import HALF, WEIGHT_FULL
 from hitplanes.planes.grid.rasterize import DIAGONAL
 from hitplanes.planes.grid.spans import Box
 from hitplanes.planes.jit import raycast as cast
-from hitplanes.planes.jit.areas import (
-    KEY,
-    NOBODY,
-    OWNERS,
-    PELLETS,
-    PIXELS,
-    RANK,
-    SAMPLES,
-    SUMS,
-    WEIGHT,
-    X,
-    Y,
-    match_rounds,
-)
+from hitplanes.planes.jit.areas import KEY, NOBODY, OWNERS, PELLETS, PIXELS, RANK, SAMPLES, SUMS, WEIGHT, X, Y, match
 from hitplanes.planes.jit.bit_rows import BOXES, EVERYWHERE, FEW_ROWS, FLAGS, INTS, ROWS_OUT, WORDS, cell_at
 from hitplanes.planes.jit.cache import compiled
 from hitplanes.planes.jit.raycast import NOWHERE, fits, follow
@@ -167,7 +154,7 @@ def _shot(at_x, at_y, tiles, shape, found):
     origin_x[0], origin_y[0] = column, row
     for pellet in range(pellets):
         x[pellet], y[pellet], kind[pellet] = column + shape.pellet_x[pellet], row + shape.pellet_y[pellet], 0
-    turn, rows, _ = match_rounds(
+    turn, rows, _ = match(
         0, 1, 0, out, kind, x, y, origin_x, origin_y,
         shape.box, shape.first, shape.rows, shape.words, NO_STRIPS, shape.sums, shape.first_sum,
         tiles.rank, tiles.box, tiles.begin, tiles.words, tiles.occluder, tiles.categories, tiles.owner,
