@@ -204,11 +204,8 @@ def test_what_pellets_of_a_round_share_with_items(name: str, seed: int, room: in
 
 @examples(100, deadline=None)
 @given(SEEDS, st.sampled_from([64, 2**15]))
-@pytest.mark.parametrize("name", ["hitplanes.planes.bits.bit_rows", "hitplanes.planes.jit.bit_rows"])
-def test_what_lies_in_front_is_not_seen(name: str, seed: int, at_once: int) -> None:
-    if ".jit." in name:
-        pytest.importorskip("numba")
-    kernels, rng = importlib.import_module(name), random.Random(seed)
+def test_what_lies_in_front_is_not_seen(seed: int, at_once: int) -> None:
+    rng = random.Random(seed)
     masks = [mask_of(rng, rng.randint(1, WORD), rng.randint(1, WORD)) for _ in range(rng.randint(1, 6))]
     words = np.zeros(STRIDE * len(masks) + WORD, np.uint64)
     begin = np.arange(len(masks)) * STRIDE + WORD
@@ -221,7 +218,7 @@ def test_what_lies_in_front_is_not_seen(name: str, seed: int, at_once: int) -> N
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(bit_rows, "WORDS_AT_ONCE", at_once)
         seen = bit_rows.rows_of(words, WORD, begin)
-        kernels.take_away(seen, words, as_read(of.copy(), rng), begin[other] - down, right)
+        bit_rows.take_away(seen, words, as_read(of.copy(), rng), begin[other] - down, right)
     for number, mask in enumerate(masks):
         left = pixels_of(mask, 0, 0)
         for (own, front), corner in zip(pairs, shift, strict=True):

@@ -236,7 +236,7 @@ def _hide(rows: Words, tiles: OrderedTiles, near: Near, pierce: bool) -> None:
     if pierce:
         ends = tiles.occluder[front].nonzero()[0]
         of, front, right = of[ends], front[ends], right[ends]
-    kernels_of(bit_rows).take_away(rows, tiles.words, of, _first(tiles, front, near.top[of]), right)
+    bit_rows.take_away(rows, tiles.words, of, _first(tiles, front, near.top[of]), right)
 
 
 def _shelter(

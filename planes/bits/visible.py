@@ -164,7 +164,7 @@ def _rows(tiles: Tiles, boxes_xyxy: Ints, bounds: Box | None, which: Ints, of: I
     boxes = boxes_xyxy[which]
     right, down = (boxes_xyxy[front, :2] - boxes[of, :2]).T
     rows = bit_rows.rows_of(tiles.words, height, tiles.begin[which])
-    kernels_of(bit_rows).take_away(rows, tiles.words, of, tiles.begin[front] - down, right)
+    bit_rows.take_away(rows, tiles.words, of, tiles.begin[front] - down, right)
     if bounds is not None:
         bit_rows.cut_off(rows, boxes[:, 0], boxes[:, 1], bounds)
     return rows

@@ -177,23 +177,6 @@ def shared(tiles, tile, windows, word, step, shift, low, high, own, level):
     return samples, *pixel_of(nearest, own, low - level)
 
 
-@compiled(types.void(types.uint64[:, ::1], WORDS, INTS, INTS, INTS))
-def _take_away(rows, words, of, front, right):
-    for pair in range(len(of)):
-        own, shift = of[pair], right[pair]
-        for row in range(rows.shape[1]):
-            cover = words[front[pair] + row]
-            if shift >= 0:
-                rows[own, row] &= ~(cover << np.uint64(shift))
-            else:
-                rows[own, row] &= ~(cover >> np.uint64(-shift))
-
-
-def take_away(rows: Words, words: Words, of: Ints, front: Ints, right: Ints) -> None:
-    """See `bits.bit_rows.take_away`."""
-    _take_away(rows, words, of, front, right)
-
-
 BEYOND = 2**40  # farther than any column
 
 
