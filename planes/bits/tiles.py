@@ -12,7 +12,7 @@ The stride leaves room for both sets side by side, so that pixels shifted out of
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, groupby, takewhile
 from operator import itemgetter
@@ -505,13 +505,13 @@ def hit_by_few(placed: Placed, patterns: Sequence[BigPattern], near: tuple[Ints,
     hits: list[Hit] = []
     for placement, close in groupby(_near(*near, ground), itemgetter(0)):
         pattern, x, y = patterns[placed.pattern.item(placement)], placed.x.item(placement), placed.y.item(placement)
-        hits += _hit_by(pattern, x, y, close, ground)
-    return _in_order(hits, ground)
+        hits += in_order(_hit_by(pattern, x, y, close, ground))
+    return hits
 
 
 def hit_by_one(pattern: BigPattern, x: int, y: int, near: tuple[Ints, Ints], ground: Ground) -> list[Hit]:
     """Like `hit_by_few`, for one pattern on pixel (x, y)."""
-    return _in_order(list(_hit_by(pattern, x, y, _near(*near, ground), ground)), ground)
+    return in_order(_hit_by(pattern, x, y, _near(*near, ground), ground))
 
 
 def _near(placement: Ints, tile: Ints, ground: Ground) -> Iterator[Pair]:
@@ -548,13 +548,16 @@ def _hit_by(pattern: BigPattern, x: int, y: int, near: Iterator[Pair], ground: G
 
 
 # house: row order
-def _in_order(hits: list[Hit], ground: Ground) -> list[Hit]:
-    """Hits of items, in the order of rows, from hits of tiles."""
-    if not ground.tiles.whole:
-        every: dict[tuple[int, int], Hit] = {}
-        for hit in hits:
-            key = hit[0], hit[4]
-            other = every.get(key)
-            every[key] = hit if other is None else (*min(hit[:5], other[:5]), hit[5] + other[5], hit[6] + other[6])
-        hits = list(every.values())
-    return sorted(hits)
+def in_order(hits: Iterable[Hit]) -> list[Hit]:
+    """Hits of a placement on items, in the order of rows, from those on tiles, front to back."""
+    items: list[Hit] = []
+    last = -1
+    for hit in hits:
+        if hit[4] == last:
+            other = items.pop()
+            items.append((*min(hit[:5], other[:5]), hit[5] + other[5], hit[6] + other[6]))
+        else:
+            items.append(hit)
+            last = hit[4]
+    items.sort()
+    return items

@@ -24,6 +24,7 @@ from hitplanes.planes.bits.tiles import (
     Ground,
     Hit,
     hit_by_one,
+    in_order,
     integers_ns,
     stride_of,
     visible_ns,
@@ -66,16 +67,12 @@ CELL_BYTES, ENTRY_BYTES = 400, 300
 """Memory of a square, and of each tile that it lists, bytes."""
 
 SeenTile = tuple[int, int, int, int, int, int]
-"""A visible tile: its box (left, top, right, bottom), first row in the words of the set, and the id of its item."""
+"""A visible tile: its box (left, top, right, bottom), first row in the words of the set, and the rank of its item."""
 
 Square = tuple[SeenTile, ...]
 
 UNMADE: Square = ((0, 0, 0, 0, 0, 0),)
 """Stands for a square that is not made yet."""
-
-Shared = tuple[int, int, int, int, int, int, int]
-"""Hit of a round on an object: squared distance, y and x of the nearest pixel, relative to the round's pixel; a number
-that rises from front to back; id of the object; number of pixels, and their share."""
 
 Look = Callable[[Any, Any, OneShot], None]
 """Function (x, y, answer) that appends the hits of a round at pixel (x, y) to an answer, in order.
@@ -185,7 +182,6 @@ class GroundCache:
 
 
 # house: way of areas
-# house: row order
 def look(fired: Round) -> tuple[Look, int]:
     """Function that looks up what a round hits, and the bytes kept for it."""
     plain, number, tell = fired.pattern.bigs[0], fired.number, OneShot.append
@@ -197,13 +193,14 @@ def look(fired: Round) -> tuple[Look, int]:
     def look(x: int, y: int, hits: OneShot) -> None:
         """Append the hits on the tiles near a pixel to an answer, the nearest first."""
         near: PositionCache = hits._present.near
+        ids = hits._present.stack.ids
         square = near.made[x >> CELL_SHIFT][y >> CELL_SHIFT]
-        shared: list[Shared] = []
+        found: list[Hit] = []
         if square is UNMADE:
-            shared, square = near.walked(pattern, x, y), ()
-        left, top, last = x + first_x, y + first_y, -1
+            found, square = near.walked(pattern, x, y), ()
+        left, top = x + first_x, y + first_y
         right, bottom, tiles = left + wide, top + high, near.tiles(stride)
-        for x_min, y_min, x_max, y_max, begin, item in square:
+        for x_min, y_min, x_max, y_max, begin, rank in square:
             if x_min <= right and left <= x_max and y_min <= bottom and top <= y_max:
                 bits = tiles.get(begin)
                 if bits is None:
@@ -211,18 +208,11 @@ def look(fired: Round) -> tuple[Look, int]:
                 shift = (y_min - top) * stride + x_min - left
                 hit = (bits << shift if shift >= 0 else bits >> -shift) & rows
                 if hit:
-                    n = hit.bit_count()
-                    own: Shared = (*nearest(hit), len(shared), item, n, share(hit, n))  # front to back
-                    if item == last:
-                        other = shared.pop()
-                        own = (*min(own[:3], other[:3]), other[3], item, n + other[5], own[6] + other[6])
-                    shared.append(own)
-                    last = item
-        if len(shared) > 1:
-            shared.sort()
-        for distance2, dy, dx, _, item, n, part in shared:
+                    (distance2, down, right_by), n = nearest(hit), hit.bit_count()
+                    found.append((0, distance2, y + down, x + right_by, rank, n, share(hit, n)))
+        for _, distance2, py, px, rank, n, part in in_order(found) if len(found) > 1 else found:
             samples, weight, pellets = counted(part, n)
-            tell(hits, new(HitRow, (0, number, item, samples, n, weight, pellets, (x + dx, y + dy), distance2)))
+            tell(hits, new(HitRow, (0, number, ids.item(rank), samples, n, weight, pellets, (px, py), distance2)))
 
     return look, pattern.nbytes
 
@@ -273,7 +263,7 @@ class PositionCache:
         self.nbytes += tiles.nbytes_each
         return tiles.read(visible.seen.words, begin)
 
-    def walked(self, pattern: BigPattern, x: int, y: int) -> list[Shared]:
+    def walked(self, pattern: BigPattern, x: int, y: int) -> list[Hit]:
         """Walk the tiles that a round at pixel (x, y) may meet; return what it hits, in order.
 
         Raises
@@ -287,12 +277,7 @@ class PositionCache:
         tile = meets(box, ground.boxes_xyxy).nonzero()[0]
         self._lose(integers_ns(len(tile), pattern.wide, pattern.high))
         near = accepted((np.zeros_like(tile), tile), ground, self._shots, ZERO)
-        found: list[Hit] = hit_by_one(pattern, x, y, near, ground)
-        ids = ground.stack.ids
-        return [
-            (distance2, py - y, px - x, k, ids.item(rank), n, part)
-            for k, (_, distance2, py, px, rank, n, part) in enumerate(found)
-        ]
+        return hit_by_one(pattern, x, y, near, ground)
 
     def _lose(self, ns: float) -> None:
         """Count the time of a walk, which a visible set would save; make the set once that pays."""
@@ -323,9 +308,8 @@ class PositionCache:
 
     def _square(self, visible: VisibleSet, x: int, y: int) -> Square:
         """Visible tiles near the square that begins at a pixel, front to back."""
-        assert self._stack is not None  # `follow` is called first
         seen, reach = visible.seen, self._reach
         box = np.array([x - reach, y - reach, x + SIDE - 1 + reach, y + SIDE - 1 + reach])
         near = meets(box, seen.box_xyxy).nonzero()[0]
-        columns = (*seen.box_xyxy[near].T, seen.begin[near], self._stack.ids[seen.rank[near]])
+        columns = (*seen.box_xyxy[near].T, seen.begin[near], seen.rank[near])
         return tuple(zip(*(column.tolist() for column in columns), strict=True))
