@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from ..common.checks import Ints
+from ..common.checks import Bools, Ints
 from ..grid.spans import Columns, each_pixel, ragged
 from ..scene.items import Stack
 
@@ -124,7 +124,7 @@ def walk(
     events, and the state of each sample, in the order of the runs
     """
     state = np.full(int(runs.lengths.sum()), LIVE, np.uint8)
-    kind, keep = pairs.kind, _kept(pairs.kind, pierce)
+    kind, keep = pairs.kind, np.where(ends(pairs.kind, pierce), ~LIVE & 31, 31).astype(np.uint8)
     pair, run, x_first, x_last = _meetings(runs, pairs, stack)
     box, item = stack.box_xyxy, pairs.rank[pair]
     sample = (np.cumsum(runs.lengths) - runs.lengths - runs.x_first)[run]
@@ -147,10 +147,9 @@ def walk(
     return _events_of(emitted, item, run), state
 
 
-def _kept(kind: Kinds, pierce: bool) -> Kinds:
-    """Bits of a sample's state that each pair leaves: an accepted item ends the walk, an object unless shots pierce."""
-    ends = (kind == BLOCK) | ((kind == HIT) & (not pierce))
-    return np.where(ends, ~LIVE & 31, 31).astype(np.uint8)
+def ends(kind: npt.NDArray[np.integer[Any]], pierce: bool) -> Bools:
+    """Whether items that do this to a sample end its walk: an accepted item does, an object unless shots pierce."""
+    return np.asarray((kind == BLOCK) | ((kind == HIT) & (not pierce)))
 
 
 def _events_of(emitted: list[tuple[Ints, Ints, Kinds]], item: Ints, run: Ints) -> Events:

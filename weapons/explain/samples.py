@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hitplanes.planes import late
-from hitplanes.planes.bits.span_walk import BLOCK, HIT, SHELTERED, SKIP, VERDICT_OF, Events, Runs, Verdict, walk
+from hitplanes.planes.bits.span_walk import BLOCK, HIT, SHELTERED, SKIP, VERDICT_OF, Events, Runs, Verdict, ends, walk
 from hitplanes.planes.common.checks import Bools, InputError, Ints
 from hitplanes.planes.common.limits import CHUNK_SAMPLES, DETAIL_SAMPLES_MAX, FRAGILE_PX, MARGIN_PX, NEAR_PX
 from hitplanes.planes.grid.spans import Box, Spans, clipped, each_pixel, pieces
@@ -259,7 +259,6 @@ def why_not_of(detail: Detail, hit: Set[int]) -> list[WhyNot]:
     return sorted(found, key=lambda w: (w.distance, w.object))
 
 
-# house: hit rule of areas
 def detail_of(context: QueryContext, weapon: Weapon, shots: Shots) -> Detail:
     """Walk every sample of shots and record its verdict and the items that decided it."""
     stack, bounds, blockers = context.stack, context.bounds, context.blockers
@@ -278,9 +277,10 @@ def detail_of(context: QueryContext, weapon: Weapon, shots: Shots) -> Detail:
     for kind in (SKIP, BLOCK, HIT):  # the first of a kind counts; a hit outranks a block, a block a skip
         latest = events.take(np.flatnonzero(events.kind == kind)[::-1])
         event, column = each_pixel(latest.x_first, latest.x_last)
-        rank[start[latest.run][event] + column] = latest.rank[event]
-        if kind == BLOCK or (kind == HIT and not context.pierce):
-            ended[start[latest.run][event] + column] = latest.rank[event]
+        sample = start[latest.run][event] + column
+        rank[sample] = latest.rank[event]
+        if ends(latest.kind, context.pierce).all():
+            ended[sample] = latest.rank[event]
     verdict, y = VERDICT_OF[state], runs.y[run]
     hidden = (state & SHELTERED != 0) & (verdict != Verdict.HIT)
     if blockers is not None and hidden.any():
@@ -358,8 +358,7 @@ def _visible(context: QueryContext, rank: int, shot: Shots) -> Bools:
     """Mask of an object with the pixels that a pattern covering everything would hit, without a line of sight."""
     stack, box, seen = context.stack, context.stack.box_xyxy[rank], context.stack.mask(rank).copy()
     near = pairs_of(box[None], np.zeros(1, np.int64), shot, stack)
-    hides = (near.rank < rank) & ((near.kind == BLOCK) | ((near.kind == HIT) & (not context.pierce)))
-    front = near.rank[hides]
+    front = near.rank[(near.rank < rank) & ends(near.kind, context.pierce)]
     for other, shared in zip(front.tolist(), clipped(stack.box_xyxy[front], box), strict=True):
         seen[_part(shared, box)] &= ~stack.mask(other)[_part(shared, stack.box_xyxy[other])]
     if context.bounds is not None:
