@@ -182,12 +182,6 @@ def _compact(asked_xyxy: Ints, boxes_xyxy: Ints) -> tuple[npt.NDArray[Any], npt.
         return asked_xyxy, boxes_xyxy.T
     both = (asked_xyxy, boxes_xyxy)
     low = min(int(np.minimum.reduce(boxes, axis=None)) for boxes in both)
-    high = max(int(np.maximum.reduce(boxes, axis=None)) for boxes in both)
-    if low >= -(2**15) and high < 2**15:  # most worlds; no corner is needed
-        return asked_xyxy.astype(np.int16), boxes_xyxy.T.astype(np.int16, order="C")
-    corner = np.minimum(asked_xyxy.min(axis=0), boxes_xyxy.min(axis=0)).reshape(2, 2).min(axis=0)
-    most = np.maximum(asked_xyxy.max(axis=0), boxes_xyxy.max(axis=0)).reshape(2, 2).max(axis=0)
-    size = int((most - corner).max())
+    size = max(int(np.maximum.reduce(boxes, axis=None)) for boxes in both) - low
     kind = np.int16 if size < 2**15 else np.int32 if size < 2**31 else np.int64
-    corner = np.concatenate([corner, corner])
-    return (asked_xyxy - corner).astype(kind), (boxes_xyxy - corner).T.astype(kind, order="C")
+    return (asked_xyxy - low).astype(kind), (boxes_xyxy - low).T.astype(kind, order="C")

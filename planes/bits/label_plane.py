@@ -66,16 +66,14 @@ CELL_BITS = 3
 
 def occupied(labels: Labels) -> Bools:
     """The coarse map of a label plane (h, w): whether anything lies in each cell; the last cells may be cut."""
-    side = 1 << CELL_BITS
-    rows = labels[::side].copy()
-    for k in range(1, side):
-        part = labels[k::side]
-        rows[: len(part)] |= part
-    cells = rows[:, ::side].copy()
-    for k in range(1, side):
-        part = rows[:, k::side]
-        cells[:, : part.shape[1]] |= part
-    return np.not_equal(cells, 0)
+    side, cells = 1 << CELL_BITS, labels
+    for _ in range(2):  # rows, then columns
+        joined = cells[::side].copy()
+        for k in range(1, side):
+            part = cells[k::side]
+            joined[: len(part)] |= part
+        cells = joined.T
+    return np.ascontiguousarray(cells != 0)
 
 
 class Front(NamedTuple):

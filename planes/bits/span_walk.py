@@ -188,13 +188,10 @@ def _meetings(runs: Runs, pairs: Pairs, stack: Stack) -> tuple[Ints, Ints, Ints,
     return pair[mask], run[mask], x_first[mask], x_last[mask]
 
 
-def _stretches(group: Ints, x: Ints, value: npt.NDArray[np.generic] | None = None) -> tuple[Ints, Ints]:
+def _stretches(group: Ints, x: Ints, value: Kinds) -> tuple[Ints, Ints]:
     """First and last index of each stretch of neighbours that have one group and one value."""
     if not len(x):
         none = np.zeros(0, np.int64)
         return none, none
-    apart = (group[1:] != group[:-1]) | (x[1:] != x[:-1] + 1)
-    if value is not None:
-        apart |= value[1:] != value[:-1]
-    cut = np.flatnonzero(apart)
+    cut = np.flatnonzero((group[1:] != group[:-1]) | (x[1:] != x[:-1] + 1) | (value[1:] != value[:-1]))
     return np.concatenate([[0], cut + 1]), np.concatenate([cut, [len(x) - 1]])
