@@ -135,23 +135,8 @@ def _sort(numbers, count):
 
 
 @helper()
-def take(tiles, tile, rest, word, step, shift, low, high):
-    """Clear the pixels of a tile in the rest of a pattern, in rows `low` to `high`; return how many were cleared."""
-    tile, word, following = np.uint64(tile + low), np.uint64(word + low), np.uint64(word + step + low)
-    left, right = np.uint64(shift), np.uint64(63 - shift)
-    taken = 0
-    for i in range(high - low + 1):
-        row = np.uint64(i)
-        near, far = tiles[tile + row] << left, tiles[tile + row] >> right >> ONE
-        taken += bits_of(rest[word + row] & near) + bits_of(rest[following + row] & far)
-        rest[word + row] &= ~near
-        rest[following + row] &= ~far
-    return taken
-
-
-@helper()
 def struck(tiles, tile, rest, word, step, shift, low, high, own, level):
-    """Count the pixels that a tile shares with the rest of a pattern, and clear them: `shared`, `take` in one pass."""
+    """Do what `shared` does, and clear the pixels in the rest of the pattern, in the same pass."""
     tile, word, following = np.uint64(tile + low), np.uint64(word + low), np.uint64(word + step + low)
     right, left = np.uint64(shift), np.uint64(63 - shift)
     ahead, behind, beyond = columns_about(own)
@@ -386,16 +371,15 @@ def match(
                 low, high = max(box[at, 1], top), min(box[at, 3], bottom)
                 offset = box[at, 0] - left + 63
                 tile, word, shift = tile_begin[at] - box[at, 1], corner + (offset >> 6) * step - top, offset & 63
-                if len(occluder) and occluder[at]:
-                    pixels -= take(tiles, tile, words, word, step, shift, low, high)
-                    continue
                 own, level = origin_x[turn] - box[at, 0], origin_y[turn]
-                if pierce or several or len(sums):
-                    found = shared(tiles, tile, words, word, step, shift, low, high, own, level)
-                else:
+                blocks = len(occluder) > 0 and occluder[at]
+                if blocks or not (pierce or several or len(sums)):
                     found = struck(tiles, tile, words, word, step, shift, low, high, own, level)
+                else:
+                    found = shared(tiles, tile, words, word, step, shift, low, high, own, level)
                 samples, weight, new, nearest = found[0], 0, found[0], key_of(found[1], found[2], found[3])
-                if samples == 0:
+                if blocks or samples == 0:
+                    pixels -= samples
                     continue
                 if len(sums):
                     place = first_sum[kind] + (low - top) * broad + offset - 63
@@ -410,7 +394,7 @@ def match(
                     new = anew(part, tiles, tile, words, word, step, shift, low, high)
                 if not pierce:
                     if several or len(sums):
-                        take(tiles, tile, words, word, step, shift, low, high)
+                        struck(tiles, tile, words, word, step, shift, low, high, own, level)
                     pixels -= samples
                 mine = row_of[rank[at]] if several else row if rank[at] == item else -1
                 if mine < 0:
