@@ -908,9 +908,9 @@ def test_lines_of_one_weapon_are_fired_together_in_parts(path: Path, monkeypatch
             made.fire(scene, weapon, places(10))
     calls: list[int] = []
 
-    def counted(at: Scene, weapon: Weapon, shots: Any, *how: str) -> Any:
+    def counted(at: Scene, weapon: Weapon, shots: Any) -> Any:
         calls.append(len(shots))
-        return fired(at, weapon, shots, *how)
+        return fired(at, weapon, shots)
 
     fired = record.fired
     monkeypatch.setattr(record, "fired", counted)

@@ -11,7 +11,7 @@ scene -> stack -> weapon -> placed patterns -> pre-filter -> samples -> rows
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -27,7 +27,7 @@ from hitplanes.planes.common.checks import Bools, Ints
 from hitplanes.planes.common.limits import CHUNK_PAIRS, CHUNK_SAMPLES
 from hitplanes.planes.grid.fixed_point import ONE
 from hitplanes.planes.scene.derived import View
-from hitplanes.planes.scene.items import Stack
+from hitplanes.planes.scene.objects import Role
 from hitplanes.planes.scene.scene import Scene
 
 from .. import late
@@ -35,13 +35,12 @@ from ..kinds.areas import parts_of, pattern_of
 from ..kinds.placements import Placements, Shots, placements_for, placements_of
 from ..kinds.weapon import Weapon, fits, fits_at_reach
 from .hits import Rows, rows_of_span_hits
-from .plan import Plan
-from .prefilter import Candidates, may_refuse, refused, view_of
+from .plan import Plan, absent, undrawn
+from .prefilter import BOX, Candidates, may_refuse, refused
 from .spans import QueryContext, direct, near_pairs
 
 if TYPE_CHECKING:
     from hitplanes.planes.bits.label_plane import LabelPlane
-    from hitplanes.planes.bits.shadows import Blockers
 
 PLACEMENTS_AT_ONCE = 2**15
 """Most placements of a part of a batch: 256 KB for each of their columns."""
@@ -80,9 +79,9 @@ def traits_of(weapon: Weapon) -> Traits:
     return kept
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Request:
-    """What a call asks of area weapons.
+@dataclass(eq=False, slots=True)
+class Request(QueryContext):
+    """What a call asks of area weapons: shots, and what they are tested against.
 
     Parameters
     ----------
@@ -90,7 +89,6 @@ class Request:
     choosy : whether a shot may refuse an item
     filtered : whether the call names a pre-filter or a broad phase
     placements : number of placements of all shots
-    blockers : items that may shelter pixels; None if there is none, or the weapon needs no line of sight
     covers : (M,) items that end pixels and have no rows: occluders, but as verdicts are counted; (0,) if there are none
     placed : placements of all shots, if they are made already
     """
@@ -98,41 +96,27 @@ class Request:
     scene: Scene
     weapon: Weapon
     shots: Shots
-    stack: Stack
     traits: Traits
     view: View | None
     choosy: bool
     filtered: bool
     placements: int
-    blockers: Blockers | None
     covers: Bools
     placed: Placements | None = None
 
 
-def request_of(scene: Scene, weapon: Weapon, shots: Shots, stack: Stack, filtered: bool) -> Request:
-    """What a call asks."""
-    traits = traits_of(weapon)
-    view, placements = view_of(traits.pierces, shots), traits.placements * len(shots)
-    blockers = None
-    if traits.sight:
-        near = late.shelter.ways_box(weapon, shots)
-        blockers = late.shelter.blockers_of(scene, stack, traits.sight, traits.inside, view, near)
-    choosy = may_refuse(stack, shots)
-    return Request(scene, weapon, shots, stack, traits, view, choosy, filtered, placements, blockers, stack.covers)
-
-
 # house: way of areas
-def by_spans(request: Request, context: QueryContext) -> list[Rows]:
+def by_spans(request: Request) -> list[Rows]:
     """Rows by the reference: spans of placed patterns walk the stack."""
-    shots, plan, rows = request.shots, context.plan, []
+    shots, plan, rows = request.shots, request.plan, []
     first = placements_for(request.weapon, shots.take(0, 1))
-    for begin, part in chunks(shots, first, context.candidates):
+    for begin, part in chunks(shots, first, request.candidates):
         placements = first if len(shots) == 1 else placements_for(request.weapon, part)
         plan.run("patterns", f"{len(placements.table)} distinct", placements.nbytes)
         if placements.table.prefix is not None:
             plan.run("weights", "falloff of the hit pixels, by prefix sums", placements.table.prefix.nbytes)
         _refuse_starts(request, part, placements)
-        rows.append(rows_of_span_hits(direct(placements, part, context), placements, request.stack.ids, begin))
+        rows.append(rows_of_span_hits(direct(placements, part, request), placements, request.stack.ids, begin))
         plan.run("rows", "", rows[-1].nbytes)
     return rows
 
@@ -154,19 +138,19 @@ def chunks(shots: Shots, first: Placements, candidates: Candidates) -> Iterator[
 
 
 # house: way of areas
-def by_tiles(request: Request, context: QueryContext) -> list[Rows]:
+def by_tiles(request: Request) -> list[Rows]:
     """Rows by the tiles of the stack, front to back: each takes its pixels from the rest of each placed pattern."""
-    stack, tiles, plan, parts = request.stack, request.scene.items.tiles(), context.plan, []
-    free = Rule(request.traits.pierces, request.scene.bounds, blockers=request.blockers)
+    stack, tiles, plan, parts = request.stack, request.scene.items.tiles(), request.plan, []
+    free = Rule(request.pierce, request.bounds, blockers=request.blockers)
     ordered = tiles.ordered(stack, request.covers, request.choosy)
     plan.run("tiles", "bit rows of the masks", 0 if tiles.whole else ordered.box_xyxy.nbytes)
     most = NEAR_AT_ONCE if request.filtered else PLACEMENTS_AT_ONCE
     first = min(CHUNK_PAIRS // max(len(stack), 1), most) if request.filtered else most
-    for begin, part, placements in parts_of_batch(request, first, most, context.candidates):
+    for begin, part, placements in parts_of_batch(request, first, most):
         windows, near = _windows(placements, plan), None
         rule = _rule(request, part, placements) if request.choosy else free
         if request.filtered:
-            placement, rank = near_pairs(placements, np.arange(len(placements)), placements.boxes, context)
+            placement, rank = near_pairs(placements, np.arange(len(placements)), placements.boxes, request)
             place, tile = tiles.of(rank)
             near = placement[place], tile
         found = kernels_of(front_to_back).front_to_back(
@@ -180,23 +164,23 @@ def by_tiles(request: Request, context: QueryContext) -> list[Rows]:
 
 def _rule(request: Request, shots: Shots, placements: Placements) -> Rule:
     """What ends the pixels of a part of the shots, which may refuse items."""
-    pierce, bounds, view = request.traits.pierces, request.scene.bounds, request.view
+    pierce, bounds, view = request.pierce, request.bounds, request.view
     if view is None:
         meets, exclude = shots.meets[placements.shot], shots.exclude[placements.shot]
         return Rule(pierce, bounds, meets, exclude, request.blockers)
     return Rule(pierce, bounds, view.meets, np.array([view.exclude], np.int64), request.blockers)
 
 
-def by_visible_set(request: Request, context: QueryContext) -> list[Rows]:
+def by_visible_set(request: Request) -> list[Rows]:
     """Rows by the loop of `by_tiles` over the tiles of what is visible, listed by cells of shot positions."""
     assert request.view is not None  # the strategy has asked
-    scene, plan, parts = request.scene, context.plan, []
+    scene, plan, parts = request.scene, request.plan, []
     visible = scene.derived.visible(request.view)
     kept = visible.made(scene.items)
     visible_set = kept or visible.read(scene.items)
     rule = Rule(True, blockers=request.blockers)
     plan.run("visible set", "what can be seen of all objects", 0 if kept else visible_set.nbytes)
-    for begin, _, placements in parts_of_batch(request, PLACEMENTS_AT_ONCE, PLACEMENTS_AT_ONCE, context.candidates):
+    for begin, _, placements in parts_of_batch(request, PLACEMENTS_AT_ONCE, PLACEMENTS_AT_ONCE):
         windows = _windows(placements, plan)
         listed, made = visible_set.cells_for(windows.box_xyxy, len(placements))
         text = "all tiles" if listed is None else f"cells of {1 << listed.bits} px"
@@ -209,9 +193,7 @@ def by_visible_set(request: Request, context: QueryContext) -> list[Rows]:
     return parts
 
 
-def parts_of_batch(
-    request: Request, first: int, most: int, candidates: Candidates
-) -> Iterator[tuple[int, Shots, Placements]]:
+def parts_of_batch(request: Request, first: int, most: int) -> Iterator[tuple[int, Shots, Placements]]:
     """Parts of a batch whose pairs and patterns fit their chunks, as (first shot, shots, placements).
 
     Parameters
@@ -232,7 +214,7 @@ def parts_of_batch(
         _refuse_starts(request, part, placements)
         yield begin, part, placements
         begin += len(part)
-        step = min(2 * step, most, CHUNK_PAIRS * begin // max(candidates.met, 1))
+        step = min(2 * step, most, CHUNK_PAIRS * begin // max(request.candidates.met, 1))
 
 
 def _refuse_starts(request: Request, shots: Shots, placements: Placements) -> None:
@@ -274,10 +256,10 @@ def labels_for(request: Request) -> LabelPlane | None:
 
 
 # house: way of areas
-def by_labels(request: Request, context: QueryContext) -> list[Rows]:
+def by_labels(request: Request) -> list[Rows]:
     """Rows of one-pixel shots, by the label of each pixel."""
     assert request.view is not None  # the strategy has asked
-    plane, plan, parts = labels_for(request), context.plan, []
+    plane, plan, parts = labels_for(request), request.plan, []
     assert plane is not None  # so here
     labels, objects = plane.read(request.scene.items), request.stack.is_object
     if request.view.of_occluders:
@@ -296,12 +278,12 @@ def by_labels(request: Request, context: QueryContext) -> list[Rows]:
 
 
 # house: way of areas
-def by_integers(request: Request, context: QueryContext) -> list[Rows]:
+def by_integers(request: Request) -> list[Rows]:
     """Rows of a few shots, counted in integers."""
-    scene, shots, plan = request.scene, request.shots, context.plan
-    tiles, placements = scene.items.tiles(), placements_for(request.weapon, shots)
+    shots, plan = request.shots, request.plan
+    tiles, placements = request.scene.items.tiles(), placements_for(request.weapon, shots)
     boxes_xyxy = tiles.boxes(request.stack.box_xyxy)
-    ground = Ground(request.stack, tiles, boxes_xyxy, context.pierce, context.bounds, request.covers)
+    ground = Ground(request.stack, tiles, boxes_xyxy, request.pierce, request.bounds, request.covers)
     plan.run("tiles", "bit rows of the masks", 0 if tiles.whole else ground.boxes_xyxy.nbytes)
     patterns = placements.table.bigs
     plan.run("patterns", f"{len(patterns)} distinct", placements.nbytes)
@@ -314,6 +296,31 @@ def by_integers(request: Request, context: QueryContext) -> list[Rows]:
     rows = _rows_of(placements, found, request.stack.ids)
     plan.run("samples", "counted in integers, front to back: boxes, filters and occluders, too", rows.nbytes)
     return [rows]
+
+
+def leave_out_unused(request: Request, way: str) -> None:
+    """Complete the plan of a call, answered by a way, with the stages that it left out."""
+    has = request.traits.weighted, request.bounds is not None, request.choosy
+    request.plan.leave_out_all(_unused, way, request.candidates, has, request.scene.items.imagery())
+
+
+def _unused(
+    way: str, candidates: Candidates, has: tuple[bool, bool, bool], imagery: Sequence[Role]
+) -> Iterator[tuple[str, str]]:
+    yield "broad phase", "visible: cells" if way == "visible" else candidates.why_unindexed
+    if not candidates.prefilter.volume:
+        yield "volumes", "boxes are the pre-filter" if candidates.prefilter == BOX else "no pre-filter"
+    yield from absent(candidates.stack, *has)
+    yield "verdicts", "counted when asked for"
+    if way == "spans":
+        idle = "no sample needed the stack"
+        yield from ((name, idle) for name in ("filter", "occluders", "pre-filter", "volumes"))
+        yield "walk", "no sample lay where it needed one"
+    if way != "visible":
+        yield "visible set", f"{way} needs none"
+    if way != "labels":
+        yield "label plane", f"{way} needs none"
+    yield from undrawn(imagery)
 
 
 def accepted(near: tuple[Ints, Ints], ground: Ground, shots: Shots, shot: Ints) -> tuple[Ints, Ints]:

@@ -20,11 +20,10 @@ from .. import late
 from ..kinds.areas import Rays, ray_parts_of
 from ..kinds.placements import Shots, checked_shots
 from ..kinds.weapon import Weapon
-from .areas import request_of
+from .areas import Request, leave_out_unused, traits_of
 from .hits import Hits, Rows
-from .plan import Plan, leave_out_unused, read_stack, unaimed
-from .prefilter import may_refuse, prefilter_of
-from .spans import QueryContext
+from .plan import Plan, read_stack, unaimed
+from .prefilter import may_refuse, prefilter_of, view_of
 from .strategy import BROADPHASES, STRATEGIES, chosen_candidates, chosen_way
 
 if TYPE_CHECKING:
@@ -62,8 +61,10 @@ if TYPE_CHECKING:
         strategy: str
 
 
-AUTO = ("auto", "auto", "auto")
-"""Pre-filter, broad phase and strategy of a call that names none."""
+How = tuple[str, str, str]
+"""Pre-filter, broad phase and strategy of a call."""
+
+AUTO: How = ("auto", "auto", "auto")
 
 ONE_AIM = int | float | np.number | None
 """Types of the aim of one shot; several aims have one position, and their filters are those of several shots."""
@@ -153,14 +154,13 @@ def fire_anew(
     seed: object,
     shot: object,
     tick: object = None,
-    how: tuple[str, str, str] = AUTO,
+    how: How = AUTO,
 ) -> Hits:
     """Decide what shots hit by what the scene keeps, not by weapons that are ready for it.
 
     Parameters
     ----------
     filters : (accept, blocked_by, exclude)
-    how : (pre-filter, broad phase, strategy)
 
     The other arguments, and errors, are those of `fire`.
     """
@@ -174,8 +174,17 @@ def fire_anew(
     if aim is None and toward is None:
         plan.leave_out_all(unaimed, weapon)
     if isinstance(scene, Scene) and tick is None:
-        return fired(scene, weapon, shots, *how, plan)
-    return _fired_at_moments(moments_of(scene, tick, len(shots)), weapon, shots, how, plan)
+        return fired(scene, weapon, shots, how, plan)
+    moments = moments_of(scene, tick, len(shots))
+    parts: list[Hits] = []
+    plan.run("past", f"{len(moments)} scenes of it")
+    for past, rows in moments:
+        parts.append(fired(past, weapon, shots.pick(rows), how, Plan() if parts else plan))
+    if len(parts) == 1:
+        return parts[0]
+    hits = parts[0].gathered(parts, [rows for _, rows in moments], shots)
+    hits.plan.run("rows", "", hits.nbytes)
+    return hits
 
 
 def is_one(at: object) -> bool:
@@ -246,21 +255,6 @@ def _check_words(prefilter: object, broadphase: object, strategy: object) -> Non
         choice("strategy", strategy, STRATEGIES)
 
 
-def _fired_at_moments(
-    moments: list[tuple[Scene, Ints]], weapon: Weapon, shots: Shots, how: tuple[str, str, str], plan: Plan
-) -> Hits:
-    """Fire shots at the scenes of their ticks; `how` is (pre-filter, broad phase, strategy)."""
-    plan.run("past", f"{len(moments)} scenes of it")
-    parts: list[Hits] = []
-    for past, rows in moments:
-        parts.append(fired(past, weapon, shots.pick(rows), *how, Plan() if parts else plan))
-    if len(parts) == 1:
-        return parts[0]
-    hits = parts[0].gathered(parts, [rows for _, rows in moments], shots)
-    hits.plan.run("rows", "", hits.nbytes)
-    return hits
-
-
 def present_of(scene: object) -> Scene:
     """The scene itself, or the present scene of a history."""
     if isinstance(scene, Scene):
@@ -296,42 +290,53 @@ def moments_of(history: Scene | History, tick: object, n: int) -> list[tuple[Sce
     return moments
 
 
-def fired(
-    scene: Scene, weapon: Weapon, shots: Shots, prefilter: str, broadphase: str, strategy: str, plan: Plan | None = None
-) -> Hits:
-    """Decide what checked shots hit; the other arguments are those of `fire`, and a plan to continue."""
+def fired(scene: Scene, weapon: Weapon, shots: Shots, how: How = AUTO, plan: Plan | None = None) -> Hits:
+    """Decide what checked shots hit; a plan is continued."""
     plan = plan or Plan()
     if len(shots) > 1:
         keep_arena()
     parts = ray_parts_of(weapon)
     if parts is not None:
-        hits: Hits = late.ray_call.fired_rays(scene, weapon, parts, shots, (prefilter, broadphase, strategy), plan)
+        hits: Hits = late.ray_call.fired_rays(scene, weapon, parts, shots, how, plan)
     else:
-        hits = _fired_areas(scene, weapon, shots, (prefilter, broadphase, strategy), plan)
+        hits = _fired_areas(scene, weapon, shots, how, plan)
     if texts := news():
         plan.run("kernels", "; ".join(texts))
     return hits
 
 
-def _fired_areas(scene: Scene, weapon: Weapon, shots: Shots, how: tuple[str, str, str], plan: Plan) -> Hits:
+def _fired_areas(scene: Scene, weapon: Weapon, shots: Shots, how: How, plan: Plan) -> Hits:
     """Decide what shots of an area weapon hit, by the way that the strategy chooses."""
-    stack = read_stack(scene, plan)
-    request = request_of(scene, weapon, shots, stack, how[:2] != ("auto", "auto"))
-    if request.blockers is not None:
-        plan.run("line of sight", f"{len(request.blockers.rank)} items may shelter", request.blockers.nbytes)
-    elif request.traits.sight:
-        plan.leave_out("line of sight", "no item near the shots may shelter")
+    request = _request_of(scene, weapon, shots, how, plan)
     way, why = chosen_way(how[2], request)
-    asked = request.placements if request.filtered or way.name == "spans" else 0
-    candidates = chosen_candidates(*how[:2], scene, stack, asked)
-    context = QueryContext(stack, scene.bounds, request.traits.pierces, candidates, plan, request.blockers)
     plan.run("plan", f"{way.name}: {why}")
-    parts = way.engine(request, context)
+    parts = way.engine(request)
     rows = Rows.joined(parts)
+    stack = request.stack
     hits = Hits(rows, lambda: late.verdicts.verdicts_of(request, rows, way.name), scene, stack, weapon, shots, plan)
-    leave_out_unused(plan, scene, candidates, request.traits.weighted, may_refuse(stack, shots), way.name)
+    leave_out_unused(request, way.name)
     plan.run("rows", "in their order", rows.nbytes if len(parts) > 1 else 0)
     return hits
+
+
+def _request_of(scene: Scene, weapon: Weapon, shots: Shots, how: How, plan: Plan) -> Request:
+    """What a call asks of an area weapon, and what its shots are tested against."""
+    stack, traits = read_stack(scene, plan), traits_of(weapon)
+    view, placements, blockers = view_of(traits.pierces, shots), traits.placements * len(shots), None
+    if traits.sight:
+        near = late.shelter.ways_box(weapon, shots)
+        blockers = late.shelter.blockers_of(scene, stack, traits.sight, traits.inside, view, near)
+        if blockers is None:
+            plan.leave_out("line of sight", "no item near the shots may shelter")
+        else:
+            plan.run("line of sight", f"{len(blockers.rank)} items may shelter", blockers.nbytes)
+    filtered = how[:2] != AUTO[:2]
+    looked_up = filtered or how[2] == "spans" or not traits.fits  # else boxes are compared as samples are counted
+    candidates = chosen_candidates(*how[:2], scene, stack, placements if looked_up else 0)
+    return Request(
+        stack, scene.bounds, traits.pierces, candidates, plan, blockers, scene, weapon, shots, traits, view,
+        may_refuse(stack, shots), filtered, placements, stack.covers,
+    )  # fmt: skip
 
 
 def category_bits(scene: Scene, field: str, value: object) -> object:

@@ -14,7 +14,6 @@ from hitplanes.planes.scene.scene import Scene
 
 from ..kinds.areas import is_directed
 from ..kinds.weapon import Weapon
-from .prefilter import BOX, Candidates
 
 READING = threading.RLock()
 """Lock, held while the notes of a plan are turned into stages."""
@@ -228,31 +227,6 @@ def read_stack(scene: Scene, plan: Plan) -> Stack:
     text = "as they were" if kept else "put in order, front to back"
     plan.run("stack", f"{len(stack)} items, {text}", 0 if kept else stack.nbytes)
     return stack
-
-
-def leave_out_unused(plan: Plan, scene: Scene, candidates: Candidates, weighted: bool, choosy: bool, way: str) -> None:
-    """Complete the plan of a call of an area weapon, answered by a way, with the stages that it left out."""
-    of = candidates, weighted, scene.bounds is not None, choosy, way, scene.items.imagery()
-    plan.leave_out_all(_unused, *of)
-
-
-def _unused(
-    candidates: Candidates, weighted: bool, bounded: bool, choosy: bool, way: str, imagery: Sequence[Role]
-) -> Iterator[tuple[str, str]]:
-    yield "broad phase", "visible: cells" if way == "visible" else candidates.why_unindexed
-    if not candidates.prefilter.volume:
-        yield "volumes", "boxes are the pre-filter" if candidates.prefilter == BOX else "no pre-filter"
-    yield from absent(candidates.stack, weighted, bounded, choosy)
-    yield "verdicts", "counted when asked for"
-    if way == "spans":
-        idle = "no sample needed the stack"
-        yield from ((name, idle) for name in ("filter", "occluders", "pre-filter", "volumes"))
-        yield "walk", "no sample lay where it needed one"
-    if way != "visible":
-        yield "visible set", f"{way} needs none"
-    if way != "labels":
-        yield "label plane", f"{way} needs none"
-    yield from undrawn(imagery)
 
 
 def unaimed(weapon: Weapon) -> Iterator[tuple[str, str]]:

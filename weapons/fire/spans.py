@@ -43,7 +43,7 @@ SPARSE = 4
 class QueryContext:
     """What placements are tested against: the stack, its bounds, whether they pierce, the pre-filter, and the plan.
 
-    `blockers` are the items that may shelter pixels, if the weapon needs a line of sight.
+    `blockers` are the items that may shelter pixels; None if there is none, or the weapon needs no line of sight.
     """
 
     stack: Stack
@@ -51,7 +51,7 @@ class QueryContext:
     pierce: bool
     candidates: Candidates
     plan: Plan
-    blockers: Blockers | None = None
+    blockers: Blockers | None
 
 
 def context_of(scene: Scene, stack: Stack, weapon: Weapon, shots: Shots | None = None, shift: int = 0) -> QueryContext:

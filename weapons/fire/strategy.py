@@ -25,7 +25,6 @@ from ..kinds.rays import RayWeapon, is_moving, is_thin_first, not_cast
 from .areas import Request, by_integers, by_labels, by_spans, by_tiles, by_visible_set, labels_for
 from .hits import Rows
 from .prefilter import BOX, Candidates, prefilter_of
-from .spans import QueryContext
 
 if TYPE_CHECKING:
     from hitplanes.planes.bits.distance_field import DistanceField
@@ -52,7 +51,7 @@ class Way(NamedTuple):
     name: str
     refuses: Callable[[Request], str]
     cost: Callable[[Request], tuple[float, float]]
-    engine: Callable[[Request, QueryContext], list[Rows]]
+    engine: Callable[[Request], list[Rows]]
 
 
 def expected_near(stack: Stack, reach: int) -> float:

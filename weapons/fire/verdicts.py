@@ -23,7 +23,7 @@ from .areas import PLACEMENTS_AT_ONCE, Request, by_tiles, chunks, parts_of_batch
 from .hits import Rows
 from .plan import Plan
 from .prefilter import Candidates
-from .spans import QueryContext, direct
+from .spans import direct
 from .strategy import chosen_way
 
 
@@ -38,29 +38,25 @@ def verdicts_of(request: Request, rows: Rows, way: str) -> Ints:
     """
     stack, items = request.stack, request.scene.items
     gone = items.stack().forms != stack.forms
+    request = replace(request, candidates=Candidates(items, stack), filtered=False, plan=Plan())  # not that of the call
     if way == "spans" or gone or request.blockers is not None or not request.traits.fits:
         return _by_spans(request)
-    fired, inside, first = _fired_and_inside(_without_pierce(request))
-    hit = _samples(_rows(first) if request.traits.pierces else rows, len(fired))
+    view = request.view and request.view._replace(pierce=False)
+    fired, inside, first = _fired_and_inside(replace(request, view=view, pierce=False))
+    hit = _samples(_rows(first) if request.pierce else rows, len(fired))
     occluded = np.zeros_like(hit)
     if stack.has_occluders:
         view = first.view and first.view._replace(of_occluders=True)
         occluded = _samples(_rows(replace(first, view=view, covers=~stack.occluder)), len(fired))
     met = hit + occluded
     if request.choosy:
-        every = by_tiles(replace(first, choosy=False, covers=NO_FLAGS), _context(first))
+        every = by_tiles(replace(first, choosy=False, covers=NO_FLAGS))
         met = _samples(Rows.joined(every), len(fired))
     counts = {
         Verdict.EMPTY: inside - met, Verdict.OUTSIDE: fired - inside, Verdict.FILTERED: met - hit - occluded,
         Verdict.OCCLUDED: occluded, Verdict.HIT: hit,
     }  # fmt: skip
     return np.stack([counts[verdict] for verdict in OF_PATTERNS], axis=1)
-
-
-def _without_pierce(request: Request) -> Request:
-    """The same shots without pierce and without a pre-filter."""
-    view = request.view and request.view._replace(pierce=False)
-    return replace(request, view=view, filtered=False, traits=request.traits._replace(pierces=False))
 
 
 def _samples(rows: Rows, shots: int) -> Ints:
@@ -71,24 +67,16 @@ def _samples(rows: Rows, shots: int) -> Ints:
 def _rows(request: Request) -> Rows:
     """Rows by the cheapest way; what is derived from a scene serves no stack that the scene has left behind."""
     if request.scene.items.stack() is not request.stack:
-        return Rows.joined(by_tiles(request, _context(request)))
-    return Rows.joined(chosen_way("auto", request)[0].engine(request, _context(request)))
-
-
-def _context(request: Request) -> QueryContext:
-    """What shots are tested against, with a plan of its own."""
-    candidates = Candidates(request.scene.items, request.stack)
-    bounds, pierces = request.scene.bounds, request.traits.pierces
-    return QueryContext(request.stack, bounds, pierces, candidates, Plan(), request.blockers)
+        return Rows.joined(by_tiles(request))
+    return Rows.joined(chosen_way("auto", request)[0].engine(request))
 
 
 def _fired_and_inside(request: Request) -> tuple[Ints, Ints, Request]:
     """Samples (N,) of shots, and those within the bounds; and the request with its placements, unless they are many."""
-    bounds, each = request.scene.bounds, request.traits.placements
+    bounds, each = request.bounds, request.traits.placements
     fired, within = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
-    candidates = Candidates(request.scene.items, request.stack)
     placements = None
-    for _, _, placements in parts_of_batch(request, PLACEMENTS_AT_ONCE, PLACEMENTS_AT_ONCE, candidates):
+    for _, _, placements in parts_of_batch(request, PLACEMENTS_AT_ONCE, PLACEMENTS_AT_ONCE):
         count, table = placements.count, placements.table
         inside = count
         if bounds is not None:
@@ -101,9 +89,9 @@ def _fired_and_inside(request: Request) -> tuple[Ints, Ints, Request]:
 
 def _by_spans(request: Request) -> Ints:
     """Samples (N, 5) of shots by verdict, by the reference."""
-    weapon, shots, then = request.weapon, request.shots, _context(request)
+    weapon, shots = request.weapon, request.shots
     verdicts = [np.zeros((0, len(OF_PATTERNS)), np.int64)]
-    for _, part in chunks(shots, placements_for(weapon, shots.take(0, 1)), then.candidates):
-        counts = direct(placements_for(weapon, part), part, then).counts
+    for _, part in chunks(shots, placements_for(weapon, shots.take(0, 1)), request.candidates):
+        counts = direct(placements_for(weapon, part), part, request).counts
         verdicts.append(counts.reshape(len(part), -1, len(OF_PATTERNS)).sum(axis=1))
     return np.concatenate(verdicts)

@@ -436,11 +436,6 @@ def is_directed(weapon: Weapon) -> bool:
     return ray is not None or (area is not None and area[2].directed)
 
 
-def pierces(weapon: Weapon) -> bool:
-    """Whether the samples of a weapon go on through objects."""
-    return parts_of(weapon)[2].pierce
-
-
 FEW_AIMS = 8
 """Most directions whose patterns are made one by one."""
 

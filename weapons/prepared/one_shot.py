@@ -23,7 +23,7 @@ from ..fire.hits import HitRow, Hits, Rows
 from ..fire.plan import Plan, absent, unaimed, undrawn
 from ..fire.prefilter import Candidates, may_refuse
 from ..fire.spans import QueryContext, SpanHits, direct
-from ..kinds.areas import parts_of, pierces
+from ..kinds.areas import parts_of
 from ..kinds.placements import (
     STRAIGHT,
     Placements,
@@ -193,7 +193,8 @@ class OneShot(Hits, list[HitRow]):
         present = self._present
         placements = placements_for(present.weapon, self.shots)
         candidates = Candidates(present.scene.items, present.stack)
-        context = QueryContext(present.stack, present.bounds, pierces(present.weapon), candidates, self.plan)
+        pierce = parts_of(present.weapon)[2].pierce
+        context = QueryContext(present.stack, present.bounds, pierce, candidates, self.plan, None)
         return placements, direct(placements, self.shots, context)
 
     def _counted(self) -> Ints:

@@ -455,7 +455,7 @@ def _results(path: Path, scene: Scene, group: Sequence[Recorded]) -> Iterator[di
     weapon, shots = group[0].weapon, _shots_of([entry.data for entry in group])
     try:
         check_aimed(weapon, shots.toward_256)
-        hits = fired(scene, weapon, shots, "auto", "auto", "auto")
+        hits = fired(scene, weapon, shots)
     except InputError as error:
         if len(group) == 1:
             raise InputError(f"{path} line {group[0].line}: {error}") from error

@@ -189,7 +189,7 @@ def _moved(then: Scene, now: Scene, items: Sequence[int], view_xyxy: Ints) -> It
 def _again(now: Scene, hits: Hits, shot: int) -> list[dict[str, Any]] | None:
     """Objects that a shot hits now; None if it would start in an item and its weapon forbids that."""
     try:
-        found = fire_checked(now, hits.weapon, hits.shots.take(shot, shot + 1), "auto", "auto", "auto")
+        found = fire_checked(now, hits.weapon, hits.shots.take(shot, shot + 1))
     except InputError:
         return None
     return [{**item_json(now, row.object), "pixels": row.pixels} for row in found]
