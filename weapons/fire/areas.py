@@ -242,11 +242,9 @@ def _rows_of(placements: Placements, found: RoundHits, ids: Ints) -> Rows:
     shot, round_ = placements.shot_of(found.turn)
     xy = np.empty((len(found.x), 2), np.int64)
     xy[:, 0], xy[:, 1] = found.x, found.y
-    columns = {
-        "shot": shot, "round": round_, "object": ids[found.rank], "samples": found.samples, "pixels": found.pixels,
-        "weight": found.weight, "pellets": found.pellets, "first_xy": xy, "distance2": found.distance2,
-    }  # fmt: skip
-    return Rows.of({name: column for name, column in columns.items() if column is not None})
+    return Rows(
+        shot, round_, ids[found.rank], found.samples, found.pixels, found.weight, found.pellets, xy, found.distance2
+    )
 
 
 def labels_for(request: Request) -> LabelPlane | None:
@@ -270,7 +268,7 @@ def by_labels(request: Request) -> list[Rows]:
         at_256 = request.shots.at_256[begin : begin + PLACEMENTS_AT_ONCE]
         front = plane.front(labels, at_256, objects)
         ids = request.stack.ids.take(request.stack.rank_by_label.take(front.label))
-        rows = Rows.of({"shot": front.place, "object": ids, "first_xy": front.xy})
+        rows = Rows(shot=front.place, object=ids, first_xy=front.xy)
         plan.run("samples", "one label for each", rows.nbytes)
         parts.append(rows.later(begin))
     plan.leave_out("patterns", "each shot is one pixel")

@@ -56,7 +56,7 @@ class HitRow(NamedTuple):
 class Rows(ShotColumns):
     """Columns of rows, ordered by (shot, round, distance2, first y, first x, place in the stack).
 
-    A column that is not given is made from DEFAULTS when it is read.
+    A column that is not given is made by DEFAULTS when it is read.
     """
 
     round: Ints
@@ -68,31 +68,10 @@ class Rows(ShotColumns):
     first_xy: Ints
     distance2: Ints
 
-    def __init__(
-        self,
-        shot: Ints,
-        round: Ints | None,  # noqa: A002
-        object: Ints,  # noqa: A002
-        samples: Ints | None,
-        pixels: Ints | None,
-        weight: Ints | None,
-        pellets: Ints | None,
-        first_xy: Ints,
-        distance2: Ints | None,
-    ) -> None:
-        columns = vars(self)
-        columns["shot"], columns["object"], columns["first_xy"] = shot, object, first_xy
-        rest = round, samples, pixels, weight, pellets, distance2
-        for name, column in zip(DEFAULTS, rest, strict=True):
-            if column is not None:
-                columns[name] = column
-
-    @classmethod
-    def of(cls, columns: dict[str, Ints]) -> Rows:
-        """Rows with the given columns; those of DEFAULTS may be missing."""
-        rows = object.__new__(cls)
-        vars(rows).update(columns)
-        return rows
+    def __init__(self, *columns: Ints | None, **named: Ints | None) -> None:
+        """Columns in the order of a `HitRow`, or by their names; those of DEFAULTS may be missing, or None."""
+        given = dict(zip(HitRow._fields, columns, strict=False)) | named
+        vars(self).update({name: column for name, column in given.items() if column is not None})
 
     def __getattr__(self, name: str) -> Any:
         """Make a column that was not given."""
@@ -108,11 +87,11 @@ class Rows(ShotColumns):
 
     def take(self, rows: Ints | Bools | slice) -> Rows:
         """Some of the rows."""
-        return Rows.of({name: column[rows] for name, column in vars(self).items()})
+        return Rows(**{name: column[rows] for name, column in vars(self).items()})
 
     def later(self, shots: int) -> Rows:
         """The same rows, with `shots` added to each shot number."""
-        return Rows.of({**vars(self), "shot": self.shot + shots}) if shots else self
+        return Rows(**vars(self) | {"shot": self.shot + shots}) if shots else self
 
     @classmethod
     def joined(cls, parts: Sequence[Rows]) -> Rows:
@@ -121,13 +100,13 @@ class Rows(ShotColumns):
             return parts[0]
         given = [name for name in HitRow._fields if any(name in vars(part) for part in parts)]
         columns = {name: np.concatenate([getattr(part, name) for part in parts]) for name in given}
-        return cls.of(columns) if parts else cls.none()
+        return cls(**columns) if parts else cls.none()
 
     @classmethod
     def none(cls) -> Rows:
         """No rows."""
         none = np.zeros(0, np.int64)
-        return cls.of({"shot": none, "object": none, "first_xy": np.zeros((0, 2), np.int64)})
+        return cls(shot=none, object=none, first_xy=np.zeros((0, 2), np.int64))
 
 
 DEFAULTS: dict[str, Callable[[Rows], Ints]] = {
