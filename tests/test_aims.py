@@ -20,7 +20,7 @@ from hitplanes.planes.grid import fixed_point, rasterize, turns
 from hitplanes.planes.grid.fixed_point import ONE, all_quarters, quarters, turned, unit, unit_toward
 from hitplanes.planes.grid.spans import Spans
 from hitplanes.weapons.kinds.areas import FEW_AIMS, AreaWeapon, pattern_of, patterns_of
-from hitplanes.weapons.kinds.weapon import AimedPatterns, big_of, big_of_bits, columns_of
+from hitplanes.weapons.kinds.weapon import AimedTable, PatternTable, big_of, big_of_bits, columns_of
 
 STAR = Polygon([(0, 0), (50, 10), (30, 40), (20, 10)])
 WEAPONS: dict[str, AreaWeapon] = {
@@ -63,11 +63,11 @@ def directions(seed: int, count: int = 40) -> Any:
 def test_bit_rows_of_all_directions_are_those_of_each(name: str, jit: bool) -> None:
     weapon, direction = WEAPONS[name], directions(3 + jit, 12)  # those of a seed are kept
     patterns = patterns_of(weapon, direction)
-    assert isinstance(patterns, AimedPatterns) and len(patterns) == len(direction) > FEW_AIMS
+    assert isinstance(patterns, AimedTable) and len(patterns) == len(direction) > FEW_AIMS
     bits, begin = patterns.bits, 64
     for i, (c, s) in enumerate(direction.tolist()):
         spans = weapon.spans(c, s)
-        assert patterns[i].spans == spans
+        assert patterns.patterns[i].spans == spans
         words, big, own = columns_of(spans), big_of_bits(bits, i), big_pattern(spans)
         assert vars(big) | {"depths": 0} == vars(own) | {"depths": 0}
         assert tuple(bits.box_xyxy[i]) == spans.box_xyxy
@@ -84,8 +84,8 @@ def test_bit_rows_of_all_directions_are_those_of_each(name: str, jit: bool) -> N
 def test_weights_of_integers_are_those_of_the_pattern_however_it_was_made(jit: bool) -> None:
     weapon = Cone(40, 50, falloff="smooth")
     patterns = patterns_of(weapon, directions(8 + jit, 12))
-    assert isinstance(patterns, AimedPatterns)
-    for big, pattern in zip(patterns.bigs, patterns, strict=True):
+    assert isinstance(patterns, AimedTable)
+    for big, pattern in zip(patterns.bigs, patterns.patterns, strict=True):
         assert pattern.prefix is not None
         assert big.share(big.rows, pattern.spans.count) == big_of(pattern).share(big.rows, 0) == pattern.prefix[-1]
 
@@ -154,12 +154,12 @@ def test_directions_are_split_together_as_one_by_one() -> None:
 def test_stencils_that_may_be_too_large_are_turned_one_by_one() -> None:
     weapon, aims = Stencil(["##"], pivot_xy=(5000, 0)), directions(2)
     assert weapon.runs(aims) is None
-    assert np.array_equal(patterns_of(weapon, aims).bits.box_xyxy[0], weapon.spans(*aims[0].tolist()).box_xyxy)  # type: ignore[attr-defined]
+    assert np.array_equal(patterns_of(weapon, aims).bits.box_xyxy[0], weapon.spans(*aims[0].tolist()).box_xyxy)
 
 
 def test_patterns_without_bit_rows_are_made_one_by_one(jit: bool) -> None:
     weapon, aims = Beam(60_000 + jit, 3), directions(2)
-    assert isinstance(patterns_of(weapon, aims), list)
+    assert type(patterns_of(weapon, aims)) is PatternTable
 
 
 def test_stencils_without_pixels_hit_nothing_at_any_aim(jit: bool) -> None:
@@ -174,7 +174,7 @@ def test_stencils_without_pixels_hit_nothing_at_any_aim(jit: bool) -> None:
 
 
 def test_strips_are_kept_for_long_patterns_alone() -> None:
-    kept = {name for name, weapon in WEAPONS.items() if len(patterns_of(weapon, directions(5)).bits.strips)}  # type: ignore[attr-defined]
+    kept = {name for name, weapon in WEAPONS.items() if len(patterns_of(weapon, directions(5)).bits.strips)}
     assert {"long box", "beam"} <= kept and not kept & {"disc", "pixel"}
 
 
@@ -378,11 +378,11 @@ def test_shots_at_many_aims_are_those_of_each_alone(name: str, corner: tuple[int
 def test_the_same_aims_are_rasterized_once() -> None:
     direction = directions(11)
     first = patterns_of(Beam(77, 5), direction)
-    assert isinstance(first, AimedPatterns)
-    assert patterns_of(Beam(77, 5), direction.copy()).bits is first.bits  # type: ignore[attr-defined]
-    assert patterns_of(Beam(78, 5), direction).bits is not first.bits  # type: ignore[attr-defined]
+    assert isinstance(first, AimedTable)
+    assert patterns_of(Beam(77, 5), direction.copy()).bits is first.bits
+    assert patterns_of(Beam(78, 5), direction).bits is not first.bits
     few = patterns_of(Beam(77, 5), direction[:FEW_AIMS])
-    assert not isinstance(few, AimedPatterns) and few[0] is pattern_of(Beam(77, 5), *direction[0].tolist())
+    assert not isinstance(few, AimedTable) and few.patterns[0] is pattern_of(Beam(77, 5), *direction[0].tolist())
     assert pattern_of(Beam(77, 5), ONE, 0).spans == Beam(77, 5).spans(ONE, 0)
 
 

@@ -25,7 +25,18 @@ from hitplanes.planes.scene.sprite import Sprite, fits, frame_pivot, rows_of
 from hitplanes.planes.scene.variants import Transform, variant_of
 
 from .rays import INSIDE, Laser, Pistol, Projectile, RayWeapon, Rifle, Sweep
-from .weapon import FALLOFFS, LENGTH, AimedPatterns, Part, Pattern, Swept, Weapon, fits_at_reach, make_pattern
+from .weapon import (
+    FALLOFFS,
+    LENGTH,
+    AimedTable,
+    Part,
+    Pattern,
+    PatternTable,
+    Swept,
+    Weapon,
+    fits_at_reach,
+    make_pattern,
+)
 
 SIGHTS = ("occluders", "all")
 ORIGIN, ONE_RING = np.zeros(2, np.int64), np.zeros(1, np.int64)
@@ -466,7 +477,7 @@ def pattern_of(weapon: AreaWeapon, c: int, s: int) -> Pattern:
     return pattern
 
 
-def patterns_of(weapon: AreaWeapon, direction: Ints) -> Sequence[Pattern]:
+def patterns_of(weapon: AreaWeapon, direction: Ints) -> PatternTable:
     """Patterns of a weapon along distinct directions (n, 2): of many only the bit rows are made, if its kind can.
 
     Without compiled kernels a few are made one by one, because that is faster, and other calls may need some again.
@@ -475,12 +486,8 @@ def patterns_of(weapon: AreaWeapon, direction: Ints) -> Sequence[Pattern]:
     far = (weighted and reach > FADING_MOST) or not fits_at_reach(reach, weighted)
     few = len(direction) <= FEW_AIMS and not jit_is_on()
     if few or type(weapon).runs is AreaWeapon.runs or far:
-        return [pattern_of(weapon, c, s) for c, s in direction.tolist()]
-
-    def make(c: int, s: int) -> Pattern:
-        return pattern_of(weapon, c, s)
-
-    return AimedPatterns(weapon.text, direction, make, weapon.runs, weapon.reach_256, weapon.falloff)
+        return PatternTable([pattern_of(weapon, c, s) for c, s in direction.tolist()])
+    return AimedTable(weapon, direction, pattern_of)
 
 
 def weapon_from_json(data: object, name: str = "weapon", kinds: tuple[type, ...] = (Weapon,)) -> Weapon:

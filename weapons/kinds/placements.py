@@ -447,10 +447,10 @@ def distinct_patterns(plain: AreaWeapon, direction: Ints | tuple[int, int]) -> t
     if isinstance(direction, tuple):
         if direction == STRAIGHT:
             return pattern_of(plain, *STRAIGHT).table, None
-        return PatternTable(patterns_of(plain, np.array([direction]))), None
+        return patterns_of(plain, np.array([direction])), None
     number, which = np.unique(direction[:, 0] * (4 * ONE) + direction[:, 1], return_inverse=True)  # |c|, |s| <= ONE
     c = (number + 2 * ONE) // (4 * ONE)
-    return PatternTable(patterns_of(plain, np.stack([c, number - c * (4 * ONE)], axis=1))), which
+    return patterns_of(plain, np.stack([c, number - c * (4 * ONE)], axis=1)), which
 
 
 def _angles(n: int, aim: object) -> Floats | float:

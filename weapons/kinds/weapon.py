@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import MISSING, dataclass, fields
 from functools import cached_property
 from itertools import chain
-from typing import Any, ClassVar, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar
 from weakref import ref
 
 import numpy as np
@@ -24,7 +24,10 @@ from hitplanes.planes.common.limits import MASK_AREA_MAX, REACH_MAX, SUB, WEIGHT
 from hitplanes.planes.common.tables import Number, Ref, Value
 from hitplanes.planes.grid import fixed_point
 from hitplanes.planes.grid.fixed_point import ONE
-from hitplanes.planes.grid.spans import RowRuns, Spans, Strip, ragged, strip_of, strips_of
+from hitplanes.planes.grid.spans import Spans, Strip, ragged, strip_of, strips_of
+
+if TYPE_CHECKING:
+    from .areas import AreaWeapon
 
 Kind = TypeVar("Kind", bound=np.generic)
 
@@ -253,45 +256,27 @@ class PatternTable:
     @cached_property
     def count(self) -> Ints:
         """Pixels (n,) of each."""
-        if isinstance(self.patterns, AimedPatterns):
-            return bit_rows.pixels_of_patterns(self.bits)
         return self.patterns[0].sizes[0] if len(self) == 1 else _sizes([p.spans for p in self.patterns])[0]
 
     @cached_property
     def box_xyxy(self) -> Ints:
         """Boxes (n, 4), inclusive; x_max < x_min for an empty pattern."""
-        if isinstance(self.patterns, AimedPatterns):
-            return self.bits.box_xyxy
         return self.patterns[0].sizes[1] if len(self) == 1 else _sizes([p.spans for p in self.patterns])[1]
 
     @property
     def fits(self) -> bool:
         """Whether the bit rows of all patterns are small enough to be made together."""
-        if isinstance(self.patterns, AimedPatterns):
-            return self.patterns.nbytes <= PATTERNS_BYTES_MOST
         return fits(self.patterns)
 
     @property
     def bigs(self) -> list[BigPattern]:
         """All patterns as integer rows; those of the last calls are kept."""
-        return self.patterns.bigs if isinstance(self.patterns, AimedPatterns) else [big_of(p) for p in self.patterns]
+        return [big_of(pattern) for pattern in self.patterns]
 
     @property
     def bits(self) -> PatternBits:
         """Bit rows of all patterns; those of the last calls are kept."""
-        return self.patterns.bits if isinstance(self.patterns, AimedPatterns) else pattern_bits_of(self.patterns)
-
-    @property
-    def words(self) -> Words:
-        """Bit rows (columns of words, rows) of the only pattern, as `columns_of` makes them."""
-        if isinstance(self.patterns, AimedPatterns):
-            return self.bits.words[WORD:].reshape(-1, self.bits.rows.item(0))
-        return _pattern_words(self.patterns[0])
-
-    @property
-    def runs(self) -> int:
-        """Number of spans of all patterns."""
-        return sum(len(p.spans) for p in self.patterns)
+        return pattern_bits_of(self.patterns)
 
     @cached_property
     def prefix(self) -> Ints | None:
@@ -334,57 +319,53 @@ class PatternTable:
         return np.asarray(self.prefix[ordinal + x_last + 1] - self.prefix[ordinal + x_first])
 
 
-class AimedPatterns(Sequence[Pattern]):
-    """Patterns of a weapon along several directions; their bit rows are made all at once, and each pattern when read.
+class AimedTable(PatternTable):
+    """Patterns of a weapon along several directions; their bit rows are made all at once, and patterns when read.
 
     Parameters
     ----------
-    text : the weapon as JSON
     direction : (n, 2) cos and sin times 2**30
-    make : function of cos and sin that returns a pattern
-    runs : function of directions that returns the runs of all patterns; None if they must be made one by one
-    reach_256 : greatest distance of a pixel, 1/256 px
-    falloff : as in `make_pattern`
+    make : function of a weapon, cos and sin that returns a pattern
     """
 
-    def __init__(
-        self,
-        text: str,
-        direction: Ints,
-        make: Callable[[int, int], Pattern],
-        runs: Callable[[Ints], RowRuns | None],
-        reach_256: int,
-        falloff: str | None,
-    ) -> None:
-        self._text, self._direction, self._make, self._runs = text, direction, make, runs
-        self._reach_256, self._falloff = reach_256, falloff
+    def __init__(self, weapon: AreaWeapon, direction: Ints, make: Callable[[AreaWeapon, int, int], Pattern]) -> None:
+        self._weapon, self._direction, self._make = weapon, direction, make
+        self._side = 2 * -(-weapon.reach_256 // SUB) + 3  # rows and columns of a pattern, at most
 
     def __len__(self) -> int:
         return len(self._direction)
 
-    def __getitem__(self, i: Any) -> Any:
-        """The pattern of a direction."""
-        return self._make(*self._direction[i].tolist())
+    @cached_property
+    def patterns(self) -> Sequence[Pattern]:  # type: ignore[override]
+        """All patterns."""
+        return [self._make(self._weapon, c, s) for c, s in self._direction.tolist()]
+
+    @cached_property
+    def count(self) -> Ints:
+        """Pixels (n,) of each."""
+        return bit_rows.pixels_of_patterns(self.bits)
+
+    @cached_property
+    def box_xyxy(self) -> Ints:
+        """Boxes (n, 4), inclusive; x_max < x_min for an empty pattern."""
+        return self.bits.box_xyxy
 
     @property
-    def nbytes(self) -> int:
-        """Bytes of the bit rows, at most."""
-        return len(self) * _window_bytes(self._side, self._side, self._falloff is not None)
-
-    @property
-    def _side(self) -> int:
-        """Rows and columns of a pattern, at most."""
-        return 2 * -(-self._reach_256 // SUB) + 3
+    def fits(self) -> bool:
+        """Whether the bit rows of all patterns are small enough to be made together."""
+        return (
+            len(self) * _window_bytes(self._side, self._side, self._weapon.falloff is not None) <= PATTERNS_BYTES_MOST
+        )
 
     @cached_property
     def bits(self) -> PatternBits:
         """Bit rows of all patterns; those of the last calls are kept."""
-        return _kept_aims.get((self._text, self._direction.tobytes()), self._rasterized)
+        return _kept_aims.get((self._weapon.text, self._direction.tobytes()), self._rasterized)
 
     @property
     def bigs(self) -> list[BigPattern]:
         """All patterns as integer rows; those of the last calls are kept."""
-        keys = ((self._text, direction.tobytes()) for direction in self._direction)
+        keys = ((self._weapon.text, direction.tobytes()) for direction in self._direction)
         return [_kept_bigs.get(key, lambda k=k: big_of_bits(self.bits, k)) for k, key in enumerate(keys)]  # type: ignore[misc]
 
     def _rasterized(self) -> PatternBits:
@@ -392,17 +373,17 @@ class AimedPatterns(Sequence[Pattern]):
         parts = list(chain(*in_parts(len(self), at_once if jit_is_on() else len(self), self._parts)))
         made = [part for part in parts if part is not None]
         if len(made) < len(parts):
-            return _made(list(self))
-        bits = made[0] if len(made) == 1 else _one_after_another(made)
-        return bits if self._falloff is None else _with_sums(bits, self._falloff, self._reach_256)
+            return _made(self.patterns)
+        bits, falloff = made[0] if len(made) == 1 else _one_after_another(made), self._weapon.falloff
+        return bits if falloff is None else _with_sums(bits, falloff, self._weapon.reach_256)
 
     def _parts(self, first: int, last: int) -> list[PatternBits | None]:
         """Bit rows of patterns `first` .. `last` - 1, some at a time; None of those that must be made one by one."""
-        normal, at_once = self._make(ONE, 0).normal, max(ROWS_AT_ONCE // self._side, 1)
+        normal, at_once = self._make(self._weapon, ONE, 0).normal, max(ROWS_AT_ONCE // self._side, 1)
         parts: list[PatternBits | None] = []
         for begin in range(first, last, at_once):
             direction, normals = self._direction[begin : min(begin + at_once, last)], NO_NORMALS
-            runs = self._runs(direction)
+            runs = self._weapon.runs(direction)
             if runs is not None and normal:
                 normals = kernels_of(fixed_point).turned_to(np.array([normal]), direction)[:, 0]
             parts.append(None if runs is None else kernels_of(bit_rows).bits_of_runs(runs, len(direction), normals))
