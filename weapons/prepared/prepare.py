@@ -81,6 +81,7 @@ class Ready(Generic[AnyHits]):
     def __init__(self, scene: Scene, weapon: Weapon, kept: Filter) -> None:
         self.scene, self.weapon = scene, weapon
         self._filter = kept
+        self._items, self._version, self._lock = scene.items, -1, threading.Lock()
         self._filtered: LruCache[tuple[object, ...], Ready[AnyHits]] = LruCache(FILTERS_MOST, lambda _: 1)
 
     def _with(self, kept: Filter) -> Ready[AnyHits]:
@@ -95,6 +96,17 @@ class Ready(Generic[AnyHits]):
         filters = accepted_of(kept.meets), blocking_of(kept.meets), exclude
         hits = fire_anew(self.scene, self.weapon, at, aim, toward, filters, kept.seed, shot)
         return cast("AnyHits", hits)
+
+    def _follow(self) -> None:
+        """Read the scene as it is now, once, also if several threads fire."""
+        with self._lock:
+            version = self._items.version
+            if version != self._version:
+                self._read(version, self._items.stack())
+                self._version = version
+
+    def _read(self, version: int, stack: Stack) -> None:
+        """Read the scene at a version."""
 
     def _snapshot(self, version: int, stack: Stack, near: Any = None) -> Present:
         scene = self.scene
@@ -179,8 +191,6 @@ class ReadyPattern(Ready[Hits]):
     ) -> None:
         super().__init__(scene, weapon, kept)
         self._reach = reach
-        self._items, self._version = scene.items, -1
-        self._lock = threading.Lock()
         self._kernels: ModuleType | None = None
         self._aims_by: dict[ModuleType, AimCache] = {} if aims is None else aims
         self._room = KEPT_BYTES if aims is None else FILTER_BYTES
@@ -245,23 +255,15 @@ class ReadyPattern(Ready[Hits]):
             look(x + dx, y + dy, hits)
         return hits
 
-    def _follow(self) -> None:
-        """Read the scene as it is now, and choose the kernels."""
-        with self._lock:
-            items = self.scene.items
-            version = items.version
-            if version == self._version:
-                return
-            kernels = kernels_of(position_cache)
-            if kernels is not self._kernels:
-                if kernels not in self._aims_by:
-                    self._aims_by[kernels] = AimCache(self.scene, self.weapon, kernels)
-                self._kernels, self._aims, self._quick = kernels, self._aims_by[kernels], {}
-                self._near = kernels.PositionCache(self.scene, self._aims.ground, self._filter, self._reach, self._room)
-            stack = items.stack()
-            self._near.follow(stack)
-            self._present = self._snapshot(version, stack, self._near)
-            self._version = version
+    def _read(self, version: int, stack: Stack) -> None:
+        kernels = kernels_of(position_cache)
+        if kernels is not self._kernels:
+            if kernels not in self._aims_by:
+                self._aims_by[kernels] = AimCache(self.scene, self.weapon, kernels)
+            self._kernels, self._aims, self._quick = kernels, self._aims_by[kernels], {}
+            self._near = kernels.PositionCache(self.scene, self._aims.ground, self._filter, self._reach, self._room)
+        self._near.follow(stack)
+        self._present = self._snapshot(version, stack, self._near)
 
 
 def plain_number(value: Any) -> Any:

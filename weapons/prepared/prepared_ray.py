@@ -8,7 +8,6 @@ position, aim -> start and step, 1/256 px -> what the ray hits -> a row for each
 
 from __future__ import annotations
 
-import threading
 from functools import cached_property
 from typing import Any
 
@@ -17,7 +16,7 @@ import numpy as np
 from hitplanes.planes.common.backend import cached_attribute, kernels_of
 from hitplanes.planes.common.checks import Ints
 from hitplanes.planes.common.limits import HALF, POSITION_MAX, REACH_MAX, SUB, WEIGHT_FULL
-from hitplanes.planes.grid.fixed_point import ONE, over_one, pixel, quarter_turns, toward
+from hitplanes.planes.grid.fixed_point import over_one, pixel, toward, unit_of
 from hitplanes.planes.grid.rasterize import Lines
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
@@ -26,6 +25,7 @@ from .. import late
 from ..fire.hits import HitRow
 from ..fire.prefilter import filters_of
 from ..kinds.areas import ray_parts_of
+from ..kinds.placements import STRAIGHT
 from ..kinds.rays import RayWeapon, unspent
 from ..kinds.weapon import Weapon
 from ..rays import raycast
@@ -85,8 +85,7 @@ class ReadyRay(Ready[RayHits]):
         super().__init__(scene, weapon, kept)
         self._ray, self._length, self._fades, self._view = ray, ray.length_256, ray.fades, kept.view(pierce=False)
         self._cast, self._budget_256 = unspent(ray), ray.budget_256
-        self._items, self._version, self._arrangement = scene.items, -1, -1
-        self._lock = threading.Lock()
+        self._arrangement = -1
         self._stack: Stack
         self._follows: Follow
         self._present: Present
@@ -163,7 +162,7 @@ class ReadyRay(Ready[RayHits]):
         if target is None:
             if self._length is None or not (aim is None or (type(aim) in PLAIN and abs(aim) <= POSITION_MAX)):
                 return None
-            c, s = (ONE, 0) if aim is None else direction(aim)
+            c, s = STRAIGHT if aim is None else unit_of(float(aim))
             return over_one(c * self._length), over_one(s * self._length)
         dx, dy = (round(SUB * to) - round(SUB * at) for to, at in zip(target, place, strict=True))
         if aim is not None or dx == 0 == dy:
@@ -177,24 +176,11 @@ class ReadyRay(Ready[RayHits]):
         scale = Lines(np.zeros((1, 2), np.int64), np.array([step]), self._ray.radius_256).scale
         return int(weights_at(np.array([entry]), scale, self._fades)[0])
 
-    def _follow(self) -> None:
-        """Read the scene as it is now, and choose the kernels."""
-        with self._lock:
-            items = self.scene.items
-            version = items.version
-            if version == self._version:
-                return
-            stack = self._stack = items.stack()
-            if stack.forms != self._arrangement:
-                self._arrangement = stack.forms
-                self._ids = stack.ids.data
-            self._follows = self._unsettled
-            cost = None if self._budget_256 is None else items.cost[stack.rows]
-            self._present = self._snapshot(version, stack, cost)
-            self._version = version
-
-
-def direction(degrees: float) -> tuple[int, int]:
-    """(cos, sin) times 2**30 of an angle, correctly rounded, equal to `fixed_point.unit`."""
-    turns, c, s = quarter_turns(float(degrees))
-    return ((c, s), (-s, c), (-c, -s), (s, -c))[turns]
+    def _read(self, version: int, stack: Stack) -> None:
+        self._stack = stack
+        if stack.forms != self._arrangement:
+            self._arrangement = stack.forms
+            self._ids = stack.ids.data
+        self._follows = self._unsettled
+        cost = None if self._budget_256 is None else self.scene.items.cost[stack.rows]
+        self._present = self._snapshot(version, stack, cost)
