@@ -69,6 +69,9 @@ AUTO: How = ("auto", "auto", "auto")
 ONE_AIM = int | float | np.number | None
 """Types of the aim of one shot; several aims have one position, and their filters are those of several shots."""
 
+ONE_RAY = None, None
+"""No burst and no spread: the parts of a weapon each shot of which is one ray."""
+
 OWNERS_READY = 16
 """Most owners that a filter which is kept excludes."""
 
@@ -203,7 +206,8 @@ def ready_for(scene: Scene | History, weapon: Weapon, filters: Filtering) -> Rea
     accept, blocked_by, exclude, seed = filters
     if type(scene) is not Scene or not isinstance(weapon, Weapon):
         return None
-    if ray_parts_of(weapon) is not None and not _is_one_ray(weapon):
+    parts = ray_parts_of(weapon)
+    if parts is not None and parts[:2] != ONE_RAY:
         return None  # `prepare` leaves several rays to `fire`
     accepts: Any = category_bits(scene, "accept", accept)
     blocks: Any = category_bits(scene, "blocked_by", blocked_by)
@@ -232,19 +236,12 @@ def _plain_owners(exclude: Any) -> tuple[int, ...] | None:
 
 def _ready_then(scene: Scene | History, weapon: Weapon, filters: Filtering, tick: object) -> Ready[Hits] | None:
     """A weapon of one ray, ready for the scene of a tick; it pays for a single shot, for which nothing is kept."""
-    if not (isinstance(tick, int | float) and isinstance(weapon, Weapon) and _is_one_ray(weapon)):
-        return None
-    if present_of(scene) is scene:
+    parts = ray_parts_of(weapon) if isinstance(tick, int | float) else None
+    if parts is None or parts[:2] != ONE_RAY or present_of(scene) is scene:
         return None
     ((past, _),) = moments_of(scene, tick, 1)
     accept, blocked_by, exclude, seed = filters
     return late.prepare.prepare(past, weapon, accept=accept, blocked_by=blocked_by, exclude=exclude, seed=seed)
-
-
-def _is_one_ray(weapon: Weapon) -> bool:
-    """Whether each shot of a weapon is one ray."""
-    parts = ray_parts_of(weapon)
-    return parts is not None and parts[:2] == (None, None)
 
 
 def _check_words(prefilter: object, broadphase: object, strategy: object) -> None:

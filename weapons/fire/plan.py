@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from time import perf_counter_ns
@@ -40,6 +41,15 @@ class Stage:
         """A stage that ran, as JSON."""
         record = {"stage": self.name, "why": self.why, "bytes": self.bytes_made}
         return record if self.pairs is None else {**record, "pairs": list(self.pairs)}
+
+    def add(self, other: Stage) -> None:
+        """Add the numbers of the same stage, which ran again; the first reason is kept."""
+        self.why = self.why or other.why
+        self.bytes_made += other.bytes_made
+        self.ns += other.ns
+        if other.pairs:
+            kept, of = self.pairs or (0, 0)
+            self.pairs = kept + other.pairs[0], of + other.pairs[1]
 
 
 class Plan:
@@ -113,12 +123,8 @@ class Plan:
         known = self._stage_of.setdefault(stage.name, stage)
         if known is stage:
             self._ran.append(stage)
-            return
-        known.why = known.why or stage.why
-        known.bytes_made += stage.bytes_made
-        known.ns += stage.ns
-        if stage.pairs:
-            known.pairs = added(known.pairs, stage.pairs)
+        else:
+            known.add(stage)
 
     @classmethod
     def joined(cls, plans: Sequence[Plan]) -> Plan:
@@ -164,37 +170,32 @@ class Plan:
         return {**self.to_dict(), "ran": [{**stage.to_dict(), "ns": stage.ns} for stage in self.ran]}
 
 
-def added(a: Sequence[int] | None, b: Sequence[int] | None) -> tuple[int, int] | None:
-    """Sum of two counts of pairs; either may be missing."""
-    known = [pairs for pairs in (a, b) if pairs]
-    return (sum(kept for kept, _ in known), sum(of for _, of in known)) if known else None
-
-
 class PlanSum:
     """Sum of the plans of many calls: how often each stage ran or was left out, its bytes and time, its first `why`."""
 
     def __init__(self) -> None:
         self.calls = 0
-        self._sums: dict[bool, dict[str, dict[str, Any]]] = {True: {}, False: {}}
+        self._sums: dict[bool, dict[str, Stage]] = {True: {}, False: {}}
+        self._calls_of = Counter[tuple[bool, str]]()
 
     def add(self, plan: Plan) -> None:
         """Count the plan of one call."""
         self.calls += 1
         for ran, stages in ((True, plan.ran), (False, plan.left_out)):
             for stage in stages:
-                record = self._sums[ran].get(stage.name)
-                if record is None:
-                    self._sums[ran][stage.name] = {**stage.to_dict(), "ns": stage.ns, "calls": 1}
-                    continue
-                record["bytes"] += stage.bytes_made
-                record["ns"] += stage.ns
-                record["calls"] += 1
-                if pairs := added(record.get("pairs"), stage.pairs):
-                    record["pairs"] = list(pairs)
+                self._calls_of[ran, stage.name] += 1
+                if stage.name in self._sums[ran]:
+                    self._sums[ran][stage.name].add(stage)
+                else:
+                    self._sums[ran][stage.name] = replace(stage)
 
     def timed(self) -> dict[str, list[dict[str, Any]]]:
         """Like `Plan.timed`, with the number of `calls` that ran, or left out, each stage."""
-        return {"ran": list(self._sums[True].values()), "left_out": list(self._sums[False].values())}
+        return {"ran": self._records(ran=True), "left_out": self._records(ran=False)}
+
+    def _records(self, *, ran: bool) -> list[dict[str, Any]]:
+        calls, stages = self._calls_of, self._sums[ran].values()
+        return [{**stage.to_dict(), "ns": stage.ns, "calls": calls[ran, stage.name]} for stage in stages]
 
 
 def plan_lines(plan: Mapping[str, Sequence[Mapping[str, Any]]], calls: int = 1) -> list[str]:

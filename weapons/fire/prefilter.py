@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 from weakref import ref
 
@@ -22,15 +22,7 @@ from hitplanes.planes.bits import cells
 from hitplanes.planes.bits.span_walk import BLOCK, HIT, SKIP, Kinds, Pairs
 from hitplanes.planes.common.backend import LruCache, kernels_of
 from hitplanes.planes.common.checks import Bools, Ints, boxes_in, choice
-from hitplanes.planes.common.limits import (
-    BOUNDING_BYTES,
-    BOUNDING_CACHE_BYTES,
-    BOXES_MAX,
-    CORNERS,
-    GROWN_PX,
-    PAIRS_AT_ONCE,
-    SUB,
-)
+from hitplanes.planes.common.limits import BOUNDING_BYTES, BOUNDING_CACHE_BYTES, CORNERS, GROWN_PX, PAIRS_AT_ONCE, SUB
 from hitplanes.planes.grid.rasterize import Lines
 from hitplanes.planes.grid.spans import meets
 from hitplanes.planes.scene.derived import OF_ALL, View
@@ -66,15 +58,6 @@ BOX = Prefilter("box")
 
 def prefilter_of(name: object) -> Prefilter:
     """Read the name of a pre-filter: one of PREFILTERS, with any number of boxes."""
-    return _known(name) if isinstance(name, str) else _named(name)
-
-
-@lru_cache(maxsize=len(PREFILTERS) + BOXES_MAX)
-def _known(name: str) -> Prefilter:
-    return _named(name)
-
-
-def _named(name: object) -> Prefilter:
     k = boxes_in("prefilter", name)
     if k is not None:
         return Prefilter(f"{k} boxes", f"{k} boxes")
@@ -169,7 +152,12 @@ class Candidates:
         """Pairs of boxes (P, 4) and items that share a pixel, as (row, rank); all pairs without a pre-filter."""
         if self.prefilter.name == "none":
             return self.every(len(boxes_xyxy))
-        row, rank = self._meeting(boxes_xyxy)
+        if self.index is None:
+            row, rank = kernels_of(cells).met_boxes(boxes_xyxy, self.stack.box_xyxy)
+        else:
+            m, rows = len(self.stack), np.flatnonzero((boxes_xyxy[:, :2] <= boxes_xyxy[:, 2:]).all(axis=1))
+            row, item = self.index.query(self.items, boxes_xyxy[rows])
+            row, rank = np.divmod(np.sort(rows[row] * m + self.stack.rank_by_label[item + 1]), m)
         self.met += len(rank)
         return row, rank
 
@@ -179,21 +167,15 @@ class Candidates:
         self.met += n * m
         return np.repeat(np.arange(n), m), np.tile(np.arange(m), n)
 
-    def _meeting(self, boxes_xyxy: Ints) -> tuple[Ints, Ints]:
-        if self.index is None:
-            found: tuple[Ints, Ints] = kernels_of(cells).met_boxes(boxes_xyxy, self.stack.box_xyxy)
-            return found
-        m = len(self.stack)
-        rows = np.flatnonzero((boxes_xyxy[:, :2] <= boxes_xyxy[:, 2:]).all(axis=1))
-        row, item = self.index.query(self.items, boxes_xyxy[rows])
-        row, rank = np.divmod(np.sort(rows[row] * m + self.stack.rank_by_label[item + 1]), m)
-        return row, rank
-
     def near(self, placements: Placements, placement: Ints, rank: Ints) -> Bools:
-        """Whether the volumes of pattern and item may meet, for pairs whose boxes do."""
+        """Whether the volumes of pattern and item meet, or floats cannot tell, for pairs whose boxes do."""
         found = placements.count[placement] > 0  # the box of an empty pattern lies within others
-        placement, rank, (name, volume) = placement[found], rank[found], self.prefilter
-        found[found] = near(name, volume, self.items, self.stack, placements, placement, rank)
+        placement, rank, prefilter = placement[found], rank[found], self.prefilter
+        if len(rank):
+            fired, of_pattern = np.unique(placements.pattern[placement], return_inverse=True)
+            patterns = pattern_volumes(prefilter.name, [placements.table.patterns[i] for i in fired.tolist()])
+            corner_xy = self.stack.box_xyxy[rank, :2] - placements.xy[placement]
+            found[found] = _meet(prefilter.volume, self.items, self.stack.rows[rank], corner_xy, patterns, of_pattern)
         return found
 
 
@@ -201,23 +183,6 @@ _kept: LruCache[tuple[ref[Pattern], str], Volumes] = LruCache(
     BOUNDING_CACHE_BYTES, lambda volume: volume.core().points.nbytes + BOUNDING_BYTES
 )
 """Volumes of patterns; the key is a weak reference, so the patterns are not kept alive."""
-
-
-def near(name: str, kind: str, items: Items, stack: Stack, placed: Placements, placement: Ints, rank: Ints) -> Bools:
-    """Which pairs of placements and items may touch: their volumes meet, or floats cannot decide.
-
-    Parameters
-    ----------
-    name : the pre-filter, which chooses the patterns' volumes
-    kind : kind of the items' volumes
-    placement, rank : (P,) placements, none with an empty pattern, and ranks of items
-    """
-    if not len(rank):
-        return np.zeros(0, np.bool_)
-    fired, of_pattern = np.unique(placed.pattern[placement], return_inverse=True)
-    patterns = pattern_volumes(name, [placed.table.patterns[i] for i in fired.tolist()])
-    shift = stack.box_xyxy[rank, :2] - placed.xy[placement]
-    return _meet(kind, items, stack.rows[rank], shift, patterns, of_pattern)
 
 
 def near_rays(kind: str, items: Items, rows: Ints, corner_xy: Ints, lines: Lines) -> Bools:
