@@ -36,8 +36,8 @@ from hitplanes import (
     use_jit,
 )
 from hitplanes.planes.common.backend import kernels_of
-from hitplanes.planes.grid.fixed_point import unit
-from hitplanes.weapons.prepared.prepared_ray import OneRay, ReadyRay, direction
+from hitplanes.planes.grid.fixed_point import unit, unit_of
+from hitplanes.weapons.prepared.prepared_ray import OneRay, ReadyRay
 from hitplanes.weapons.rays import one_ray, raycast
 from hitplanes.weapons.rays.contacts import NEVER
 from hitplanes.weapons.rays.one_ray import Ray, WideRay
@@ -356,7 +356,7 @@ def test_far_off_and_as_long_as_can_be(kernels: ModuleType) -> None:
 
 @given(st.floats(-(2.0**40), 2.0**40) | st.integers(-720, 720).map(float) | st.sampled_from([44.99999, 45.0, -45.0]))
 def test_directions_are_those_of_unit(degrees: float) -> None:
-    assert direction(degrees) == tuple(int(v) for v in unit(degrees))
+    assert unit_of(degrees) == tuple(int(v) for v in unit(degrees))
 
 
 @pytest.mark.parametrize("weapon", [Pistol(200), Laser(200, width=3)], ids=repr)
