@@ -448,4 +448,4 @@ def _shifted(placements: Placements, shift: Ints) -> Placements:
     n, table = len(shift), placements.table
     xy = np.tile(placements.xy, (n, 1)) + np.repeat(shift, len(placements), axis=0)
     pattern, turn_xy = np.tile(placements.pattern, n), np.tile(placements.turn_xy, (n, 1))
-    return Placements(table, pattern, xy, turn_xy, placements.rounds, placements.pellets, shot=0)
+    return Placements(table, pattern, xy, turn_xy, placements.rounds, placements.pellets, _shot=0)

@@ -21,7 +21,7 @@ from hitplanes.planes.scene.derived import View
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
-from ..kinds.rays import RayWeapon, is_moving, is_thin_first, not_cast
+from ..kinds.rays import RayWeapon, ends_at_first, is_moving, is_stepped, is_thin_first
 from .areas import Request, by_integers, by_labels, by_spans, by_tiles, by_visible_set, labels_for
 from .hits import Rows
 from .prefilter import BOX, Candidates, prefilter_of
@@ -138,20 +138,12 @@ def _integers_cost(request: Request) -> tuple[float, float]:
     return now.integers_call + request.placements * each, 0.0
 
 
-def _spans_refuse(_: Request) -> str:
-    return ""
-
-
-def _spans_cost(request: Request) -> tuple[float, float]:
-    return (0.0 if _tiles_refuse(request) else inf), 0.0
-
-
 WAYS = (
     Way("integers", _integers_refuse, _integers_cost, by_integers),
     Way("labels", _labels_refuse, _labels_cost, by_labels),
     Way("visible", _visible_refuse, _visible_cost, by_visible_set),
     Way("tiles", _tiles_refuse, _tiles_cost, by_tiles),
-    Way("spans", _spans_refuse, _spans_cost, by_spans),
+    Way("spans", lambda _: "", lambda request: (0.0 if _tiles_refuse(request) else inf, 0.0), by_spans),
 )
 """All ways of areas. The reference costs more than any other, so it is chosen only where bit rows do not serve."""
 
@@ -195,8 +187,11 @@ def _cheapest(request: Request, passed_over: str) -> tuple[Way, str]:
 
 
 def _not_cast(ray: RayWeapon, scene: Scene, *_: object) -> str:
-    moving = is_moving(ray, scene.items, scene.items.stack())
-    return not_cast(ray) or ("items move while rays fly" if moving else "")
+    if ray.inside != "hit" and not ends_at_first(ray):
+        return "items in which rays start are not hit"
+    if is_stepped(ray):
+        return "a projectile is tested at moments of the frame"
+    return "items move while rays fly" if is_moving(ray, scene.items, scene.items.stack()) else ""
 
 
 def _not_marched(ray: RayWeapon, scene: Scene, view: View | None) -> str:

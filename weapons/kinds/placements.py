@@ -65,6 +65,7 @@ OWNER_MAX = 2**31
 STRAIGHT = (ONE, 0)
 
 
+@dataclass(eq=False, repr=False)
 class Shots:
     """A checked batch of shots. A value that all shots share is given once; its column is made when it is read.
 
@@ -81,21 +82,15 @@ class Shots:
     aim : (N,) angles as they were given, degrees, or one value; None if none was given
     """
 
-    def __init__(
-        self,
-        at_256: Ints,
-        direction: Ints | tuple[int, int] | None,
-        toward_256: Ints | None,
-        meets: Ints | int,
-        exclude: Ints | tuple[int, ...],
-        number: Ints | int,
-        seed: Words | int,
-        row: Ints | int,
-        aim: Floats | float | None = None,
-    ) -> None:
-        self.at_256, self.toward_256, self._aim = at_256, toward_256, aim
-        self._direction, self._meets, self._exclude = direction, meets, exclude
-        self._number, self._seed, self._row = number, seed, row
+    at_256: Ints
+    _direction: Ints | tuple[int, int] | None
+    toward_256: Ints | None
+    _meets: Ints | int
+    _exclude: Ints | tuple[int, ...]
+    _number: Ints | int
+    _seed: Words | int
+    _row: Ints | int
+    _aim: Floats | float | None = None
 
     def __len__(self) -> int:
         return len(self.at_256)
@@ -178,12 +173,11 @@ class Shots:
 
     def aimed(self, direction: Ints | tuple[int, int]) -> Shots:
         """The same shots in other directions (N, 2), or all in one."""
-        rest = self._meets, self._exclude, self._number, self._seed, self._row
-        return Shots(self.at_256, direction, self.toward_256, *rest)
+        return replace(self, _direction=direction, _aim=None)
 
     def aimed_at(self, toward_256: Ints) -> Shots:
         """The same shots, aimed at points at offsets (N, 2)."""
-        return Shots(self.at_256, None, toward_256, self._meets, self._exclude, self._number, self._seed, self._row)
+        return replace(self, _direction=None, toward_256=toward_256, _aim=None)
 
     def take(self, first: int, last: int) -> Shots:
         """Shots first .. last - 1."""
@@ -205,6 +199,7 @@ class Shots:
         )  # fmt: skip
 
 
+@dataclass(eq=False, repr=False)
 class Placements:
     """Placed patterns, sorted by (shot, round, pellet), as columns.
 
@@ -218,18 +213,13 @@ class Placements:
     shot : number of the shot, if all are placements of the same one
     """
 
-    def __init__(
-        self,
-        table: PatternTable,
-        pattern: Ints | None,
-        xy: Ints,
-        turn_xy: Ints,
-        rounds: int = 1,
-        pellets: int = 1,
-        shot: int | None = None,
-    ) -> None:
-        self.table, self.xy, self.turn_xy, self.rounds, self.pellets = table, xy, turn_xy, rounds, pellets
-        self._pattern, self._shot = pattern, shot
+    table: PatternTable
+    _pattern: Ints | None
+    xy: Ints
+    turn_xy: Ints
+    rounds: int = 1
+    pellets: int = 1
+    _shot: int | None = None
 
     def __len__(self) -> int:
         return len(self.xy)

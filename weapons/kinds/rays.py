@@ -229,13 +229,6 @@ def is_moving(ray: RayWeapon, items: Items, stack: Stack) -> bool:
     return isinstance(ray, Projectile) and bool(items.velocity_256[stack.rows].any())
 
 
-def not_cast(ray: RayWeapon) -> str:
-    """Why rays of a weapon must walk cell by cell, whatever the scene; or ""."""
-    if ray.inside != "hit" and not ends_at_first(ray):
-        return "items in which rays start are not hit"
-    return "a projectile is tested at moments of the frame" if is_stepped(ray) else ""
-
-
 def is_stepped(ray: RayWeapon) -> bool:
     """Whether rays of a weapon are tested at some moments of the frame alone."""
     return isinstance(ray, Projectile) and (ray.steps is not None or not ray.length_256)
