@@ -100,9 +100,10 @@ class Ready(Generic[AnyHits]):
     def _follow(self) -> None:
         """Read the scene as it is now, once, also if several threads fire."""
         with self._lock:
-            version = self._items.version
+            items = self.scene.items  # so masks that were not made yet are made
+            version = items.version
             if version != self._version:
-                self._read(version, self._items.stack())
+                self._read(version, items.stack())
                 self._version = version
 
     def _read(self, version: int, stack: Stack) -> None:
