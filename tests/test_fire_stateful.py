@@ -405,8 +405,8 @@ def in_whole_parts() -> list[tuple[Placements, Scene, str, Hits]]:
 def test_the_size_of_the_parts_changes_no_row(
     in_whole_parts: list[tuple[Placements, Scene, str, Hits]], samples: int, pairs: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(areas, "CHUNK_SAMPLES", samples)
     monkeypatch.setattr(areas, "CHUNK_PAIRS", pairs)
+    monkeypatch.setattr(spans, "CHUNK_PAIRS", pairs)
     monkeypatch.setattr(areas, "PLACEMENTS_AT_ONCE", samples)
     monkeypatch.setattr(bit_rows, "WORDS_AT_ONCE", max(samples, WORD))
     monkeypatch.setattr(cells, "PAIRS_AT_ONCE", pairs)

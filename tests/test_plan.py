@@ -102,7 +102,7 @@ class Clock:
 
 
 FIRING, RESOLVE, TRACING, RAYFIRE = call, spans, ray_walk, ray_call
-BITFIRE, RUNFIRE, PATTERNS = areas, areas, weapon_module
+BITFIRE, RUNFIRE, PATTERNS = areas, spans, weapon_module
 OF_ALL = [(FIRING, "checked_shots", "shots", 1), (items.Items, "stack_of", "stack", 10)]
 OF_BITS = [
     *OF_ALL,
@@ -567,7 +567,7 @@ OF_SCENES = (
     " scene.sprite scene.variants"
 )
 OF_FIRE = (
-    "fire.areas fire.call fire.hits fire.plan fire.prefilter fire.spans fire.strategy kinds.areas kinds.placements"
+    "fire.areas fire.call fire.hits fire.plan fire.prefilter fire.strategy kinds.areas kinds.placements"
     " kinds.rays kinds.weapon late"
 )
 OF_A_RAY = "rays.contacts rays.first_hit rays.ray_call rays.ray_hits rays.ray_walk rays.raycast"

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from .explain import ray_verdicts as ray_verdicts
     from .explain import samples as samples
     from .fire import shelter as shelter
+    from .fire import spans as spans
     from .fire import verdicts as verdicts
     from .kinds import draws as draws
     from .prepared import prepare as prepare
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
 _PLACES = (
     "explain.owners", "explain.ray_margins", "explain.ray_samples", "explain.ray_verdicts", "explain.samples",
-    "fire.shelter", "fire.verdicts", "kinds.draws", "prepared.prepare", "rays.one_ray", "rays.ray_call",
+    "fire.shelter", "fire.spans", "fire.verdicts", "kinds.draws", "prepared.prepare", "rays.one_ray", "rays.ray_call",
     "replay.shot_log",
 )  # fmt: skip
 

@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 from hitplanes.planes.scene.items import Stack
 
-from ..fire.areas import chunks
 from ..fire.hits import HitRow
-from ..fire.spans import QueryContext, direct
+from ..fire.prefilter import QueryContext
+from ..fire.spans import chunks, direct
 from ..kinds.placements import Shots, placements_for
 from ..kinds.weapon import Weapon
 

@@ -19,9 +19,9 @@ from hitplanes.planes.grid.spans import Box, Spans, clipped, each_pixel, pieces
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
-from ..fire.prefilter import pairs_of, refused
+from ..fire.prefilter import QueryContext, pairs_of, refused
 from ..fire.shelter import shelter_ranks, sheltered
-from ..fire.spans import QueryContext, context_of, direct
+from ..fire.spans import context_of, direct
 from ..kinds.areas import parts_of
 from ..kinds.placements import Placements, Shots, placements_for
 from ..kinds.weapon import Weapon

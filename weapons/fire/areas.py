@@ -2,7 +2,7 @@
 
 scene -> stack -> weapon -> placed patterns -> pre-filter -> samples -> rows
 
-- `by_spans`: the reference. It serves all shots; verdicts, samples and margins are read from it.
+- `spans.by_spans`: the reference. It serves all shots; verdicts, samples and margins are read from it.
 - `by_tiles`: placements against the tiles of the stack, front to back, by bit rows.
 - `by_visible_set`: the same loop against what is visible of a scene that stands still.
 - `by_labels`: one-pixel shots read the label plane.
@@ -24,7 +24,7 @@ from hitplanes.planes.bits.front_to_back import RoundHits, Rule
 from hitplanes.planes.bits.tiles import Ground, hit_by_few
 from hitplanes.planes.common.backend import kernels_of
 from hitplanes.planes.common.checks import Bools, Ints
-from hitplanes.planes.common.limits import CHUNK_PAIRS, CHUNK_SAMPLES
+from hitplanes.planes.common.limits import CHUNK_PAIRS
 from hitplanes.planes.grid.fixed_point import ONE
 from hitplanes.planes.scene.derived import View
 from hitplanes.planes.scene.objects import Role
@@ -34,10 +34,9 @@ from .. import late
 from ..kinds.areas import parts_of, pattern_of
 from ..kinds.placements import Placements, Shots, placements_for, placements_of
 from ..kinds.weapon import Weapon, fits, fits_at_reach
-from .hits import Rows, rows_of_span_hits
+from .hits import Rows
 from .plan import Plan, absent, undrawn
-from .prefilter import BOX, Candidates, may_refuse, refused
-from .spans import QueryContext, direct, near_pairs
+from .prefilter import BOX, Candidates, QueryContext, may_refuse, near_pairs, refused
 
 if TYPE_CHECKING:
     from hitplanes.planes.bits.label_plane import LabelPlane
@@ -103,38 +102,6 @@ class Request(QueryContext):
     placements: int
     covers: Bools
     placed: Placements | None = None
-
-
-# house: way of areas
-def by_spans(request: Request) -> list[Rows]:
-    """Rows by the reference: spans of placed patterns walk the stack."""
-    shots, plan, rows = request.shots, request.plan, []
-    first = placements_for(request.weapon, shots.take(0, 1))
-    for begin, part in chunks(shots, first, request.candidates):
-        placements = first if len(shots) == 1 else placements_for(request.weapon, part)
-        plan.run("patterns", f"{len(placements.table)} distinct", placements.nbytes)
-        if placements.table.prefix is not None:
-            plan.run("weights", "falloff of the hit pixels, by prefix sums", placements.table.prefix.nbytes)
-        _refuse_starts(request, part, placements)
-        rows.append(rows_of_span_hits(direct(placements, part, request), placements, request.stack.ids, begin))
-        plan.run("rows", "", rows[-1].nbytes)
-    return rows
-
-
-def chunks(shots: Shots, first: Placements, candidates: Candidates) -> Iterator[tuple[int, Shots]]:
-    """Cut a batch into parts that stay within CHUNK_SAMPLES and CHUNK_PAIRS; patterns are as large as the first shot's.
-
-    With a broad phase, parts grow as long as placements meet few items.
-    """
-    placements = max(len(first.shot), 1)
-    most = max(1, CHUNK_SAMPLES // max(int(first.count.sum()), placements))
-    step = max(1, min(most, CHUNK_PAIRS // (placements * max(len(candidates.stack), 1))))
-    begin = 0
-    while begin < len(shots):
-        yield begin, shots.take(begin, min(begin + step, len(shots)))
-        begin += step
-        if candidates.index is not None:
-            step = max(1, min(2 * step, most, CHUNK_PAIRS * begin // max(candidates.met, 1)))
 
 
 # house: way of areas
@@ -211,13 +178,13 @@ def parts_of_batch(request: Request, first: int, most: int) -> Iterator[tuple[in
         if len(part) > 1 < len(placements.table) and not placements.table.fits:
             step = most = len(part) // 2
             continue
-        _refuse_starts(request, part, placements)
+        refuse_starts(request, part, placements)
         yield begin, part, placements
         begin += len(part)
         step = min(2 * step, most, CHUNK_PAIRS * begin // max(request.candidates.met, 1))
 
 
-def _refuse_starts(request: Request, shots: Shots, placements: Placements) -> None:
+def refuse_starts(request: Request, shots: Shots, placements: Placements) -> None:
     """Refuse shots that begin inside a blocker, if their weapon does."""
     if request.blockers is not None and request.traits.inside == "error":
         late.shelter.refuse_starts_inside(placements, shots, request.stack, request.blockers)

@@ -12,21 +12,20 @@ from typing import TYPE_CHECKING, Any, NamedTuple, SupportsIndex, overload
 import numpy as np
 import numpy.typing as npt
 
-from hitplanes.planes.bits.bit_rows import row_order
 from hitplanes.planes.bits.span_walk import Verdict
 from hitplanes.planes.common.backend import cached_attribute
 from hitplanes.planes.common.checks import Bools, InputError, Ints, integer
 from hitplanes.planes.common.limits import WEIGHT_FULL
-from hitplanes.planes.grid.spans import Spans, begins, merged_runs, sorted_once
+from hitplanes.planes.grid.spans import Spans
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
 from .. import late
 from ..kinds.areas import parts_of, ray_parts_of
-from ..kinds.placements import ONES, ZEROS, Placements, ShotColumns, Shots
+from ..kinds.placements import ONES, ZEROS, ShotColumns, Shots
 from ..kinds.weapon import Weapon
 from .plan import Plan
-from .spans import QueryContext, SpanHits, context_of
+from .prefilter import QueryContext
 
 if TYPE_CHECKING:
     from ..explain.owners import OwnerRow, Pellet
@@ -334,7 +333,8 @@ class Hits:
 
     def _pixels_of(self, scene: Scene, shots: Shots) -> Iterator[tuple[int, Spans]]:
         """Pixels of objects of a scene that shots hit, as (object, pixels), in any number of parts."""
-        return late.samples.object_spans(context_of(scene, scene.items.stack(), self.weapon, shots), self.weapon, shots)
+        context = late.spans.context_of(scene, scene.items.stack(), self.weapon, shots)
+        return late.samples.object_spans(context, self.weapon, shots)
 
     def shares(self, shot: int | None = None) -> list[Share]:
         """Samples of each row as shares of the pattern, of the visible object and of its mask; for a shot, or all."""
@@ -378,7 +378,7 @@ class Hits:
         row = self._checked(shot)
         if self._walked is None or self._walked[0] != row:
             own = self.shots.take(row, row + 1)
-            context = context_of(*self._then(row), self.weapon, own)
+            context = late.spans.context_of(*self._then(row), self.weapon, own)
             self._walked = row, late.samples.detail_of(context, self.weapon, own)
         return self._walked[1]
 
@@ -408,7 +408,7 @@ class Hits:
 
     def _context(self, shot: int) -> QueryContext:
         """What a shot of an area weapon was tested against."""
-        return context_of(*self._then(shot), self.weapon)
+        return late.spans.context_of(*self._then(shot), self.weapon)
 
     @property
     def one_scene(self) -> bool:
@@ -468,41 +468,3 @@ def _restored(
 
 def _named(row: tuple[Any, ...]) -> HitRow:
     return HitRow._make((*row[:7], tuple(row[7]), row[8]))
-
-
-def rows_of_span_hits(met: SpanHits, placements: Placements, ids: Ints, first_shot: int) -> Rows:
-    """Add runs of hit pixels up to rows; a pixel hit by several pellets counts once in `pixels`."""
-    rounds = int(placements.round.max(initial=0)) + 1
-    shot, round_ = placements.shot[met.placement], placements.round[met.placement]
-    group = (shot * rounds + round_) * max(len(ids), 1) + met.rank
-    origin = placements.origin_xy[met.placement]
-    x = np.clip(origin[:, 0], met.x_first, met.x_last)  # the pixel of a run that is nearest to the origin
-    distance2 = (x - origin[:, 0]) ** 2 + (met.y - origin[:, 1]) ** 2
-    order = row_order(group, distance2, met.y, x)
-    group, distance2 = group[order], distance2[order]
-    new = begins(group)
-    first = np.flatnonzero(new)
-    best = order[first]
-    lengths = (met.x_last - met.x_first + 1)[order]
-    samples = np.add.reduceat(lengths, first) if len(first) else lengths
-    weight = np.add.reduceat(met.weight[order], first) if len(first) else lengths
-    pellets, pixels = np.ones_like(samples), samples
-    if int(placements.pellet.max(initial=0)):
-        pellets, pixels = _distinct(met, np.cumsum(new) - 1, order, len(first))
-    sort = row_order(shot[best], round_[best], distance2[first], met.y[best], x[best], met.rank[best])
-    best = best[sort]
-    return Rows(
-        shot[best] + first_shot, round_[best], ids[met.rank[best]], samples[sort], pixels[sort], weight[sort],
-        pellets[sort], np.stack([x[best], met.y[best]], axis=1), distance2[first][sort],
-    )  # fmt: skip
-
-
-def _distinct(met: SpanHits, group: Ints, order: Ints, groups: int) -> tuple[Ints, Ints]:
-    """Pellets that hit, and pixels counted once, of each group."""
-    of = int(met.placement.max(initial=0)) + 1
-    pellets = np.bincount(sorted_once(group * of + met.placement[order]) // of, minlength=groups)
-    y = met.y[order] - met.y.min(initial=0)
-    rows = int(y.max(initial=0)) + 1
-    which, x_first, x_last = merged_runs(group * rows + y, met.x_first[order], met.x_last[order])
-    pixels = np.bincount(group[which], x_last - x_first + 1, groups).astype(np.int64)
-    return pellets, pixels

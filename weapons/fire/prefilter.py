@@ -24,14 +24,16 @@ from hitplanes.planes.common.backend import LruCache, kernels_of
 from hitplanes.planes.common.checks import Bools, Ints, boxes_in, choice
 from hitplanes.planes.common.limits import BOUNDING_BYTES, BOUNDING_CACHE_BYTES, CORNERS, GROWN_PX, PAIRS_AT_ONCE, SUB
 from hitplanes.planes.grid.rasterize import Lines
-from hitplanes.planes.grid.spans import meets
+from hitplanes.planes.grid.spans import Box, meets
 from hitplanes.planes.scene.derived import OF_ALL, View
 from hitplanes.planes.scene.items import Items, Stack
 
 from ..kinds.placements import Placements, Shots
 from ..kinds.weapon import Pattern, Swept
+from .plan import Plan
 
 if TYPE_CHECKING:
+    from hitplanes.planes.bits.shadows import Blockers
     from hitplanes.planes.broadphase.boxes import Index
     from hitplanes.planes.volumes.volumes import Capsules, Volumes
 
@@ -177,6 +179,40 @@ class Candidates:
             corner_xy = self.stack.box_xyxy[rank, :2] - placements.xy[placement]
             found[found] = _meet(prefilter.volume, self.items, self.stack.rows[rank], corner_xy, patterns, of_pattern)
         return found
+
+
+@dataclass(eq=False, slots=True)
+class QueryContext:
+    """What placements are tested against: the stack, its bounds, whether they pierce, the pre-filter, and the plan.
+
+    `blockers` are the items that may shelter pixels; None if there is none, or the weapon needs no line of sight.
+    """
+
+    stack: Stack
+    bounds: Box | None
+    pierce: bool
+    candidates: Candidates
+    plan: Plan
+    blockers: Blockers | None
+
+
+def near_pairs(placements: Placements, which: Ints, boxes: Ints, context: QueryContext) -> tuple[Ints, Ints]:
+    """Pairs of placements and ranks of the items that they may touch, sorted; the plan records how they were found."""
+    candidates, plan = context.candidates, context.plan
+    row, rank = candidates.meeting(boxes)
+    placement = which[row]
+    made = row.nbytes + rank.nbytes + placement.nbytes
+    if index := candidates.index:
+        plan.run("broad phase", f"{index.structure}: {index.followed} boxes placed anew", made)
+        made = 0
+    if candidates.prefilter.volume:
+        plan.run("pre-filter", candidates.why, made)
+        near, met = candidates.near(placements, placement, rank), len(rank)
+        placement, rank = placement[near], rank[near]
+        plan.run("volumes", candidates.prefilter.name, near.nbytes + placement.nbytes + rank.nbytes, (len(rank), met))
+        made = 0
+    plan.run("pre-filter", candidates.why, made, (len(rank), len(which) * len(context.stack)))
+    return placement, rank
 
 
 _kept: LruCache[tuple[ref[Pattern], str], Volumes] = LruCache(

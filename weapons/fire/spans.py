@@ -1,12 +1,13 @@
-"""The reference of areas: spans of placed patterns walk the stack, front to back."""
+"""The reference of areas: spans of placed patterns walk the stack, front to back, and are added up to rows."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hitplanes.planes.bits.bit_rows import row_order
 from hitplanes.planes.bits.span_walk import (
     HIT,
     LIVE,
@@ -20,38 +21,54 @@ from hitplanes.planes.bits.span_walk import (
     walk,
 )
 from hitplanes.planes.common.checks import Ints
-from hitplanes.planes.common.limits import CHUNK_SAMPLES
-from hitplanes.planes.grid.spans import Box, area, clipped, merged_runs, pieces
+from hitplanes.planes.common.limits import CHUNK_PAIRS, CHUNK_SAMPLES
+from hitplanes.planes.grid.spans import area, begins, clipped, merged_runs, pieces, sorted_once
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
 from .. import late
 from ..kinds.areas import parts_of
-from ..kinds.placements import Placements, Shots
+from ..kinds.placements import Placements, Shots, placements_for
 from ..kinds.weapon import Weapon
+from .areas import Request, refuse_starts
+from .hits import Rows
 from .plan import Plan
-from .prefilter import Candidates, kinds, may_refuse, refused
-
-if TYPE_CHECKING:
-    from hitplanes.planes.bits.shadows import Blockers
+from .prefilter import Candidates, QueryContext, kinds, may_refuse, near_pairs, refused
 
 SPARSE = 4
 """If items fill less than 1 / SPARSE of the box around them, spans are cut to each item's box, not to that one."""
 
 
-@dataclass(eq=False, slots=True)
-class QueryContext:
-    """What placements are tested against: the stack, its bounds, whether they pierce, the pre-filter, and the plan.
+# house: way of areas
+def by_spans(request: Request) -> list[Rows]:
+    """Rows by the reference: spans of placed patterns walk the stack."""
+    shots, plan, rows = request.shots, request.plan, []
+    first = placements_for(request.weapon, shots.take(0, 1))
+    for begin, part in chunks(shots, first, request.candidates):
+        placements = first if len(shots) == 1 else placements_for(request.weapon, part)
+        plan.run("patterns", f"{len(placements.table)} distinct", placements.nbytes)
+        if placements.table.prefix is not None:
+            plan.run("weights", "falloff of the hit pixels, by prefix sums", placements.table.prefix.nbytes)
+        refuse_starts(request, part, placements)
+        rows.append(rows_of_span_hits(direct(placements, part, request), placements, request.stack.ids, begin))
+        plan.run("rows", "", rows[-1].nbytes)
+    return rows
 
-    `blockers` are the items that may shelter pixels; None if there is none, or the weapon needs no line of sight.
+
+def chunks(shots: Shots, first: Placements, candidates: Candidates) -> Iterator[tuple[int, Shots]]:
+    """Cut a batch into parts that stay within CHUNK_SAMPLES and CHUNK_PAIRS; patterns are as large as the first shot's.
+
+    With a broad phase, parts grow as long as placements meet few items.
     """
-
-    stack: Stack
-    bounds: Box | None
-    pierce: bool
-    candidates: Candidates
-    plan: Plan
-    blockers: Blockers | None
+    placements = max(len(first.shot), 1)
+    most = max(1, CHUNK_SAMPLES // max(int(first.count.sum()), placements))
+    step = max(1, min(most, CHUNK_PAIRS // (placements * max(len(candidates.stack), 1))))
+    begin = 0
+    while begin < len(shots):
+        yield begin, shots.take(begin, min(begin + step, len(shots)))
+        begin += step
+        if candidates.index is not None:
+            step = max(1, min(2 * step, most, CHUNK_PAIRS * begin // max(candidates.met, 1)))
 
 
 def context_of(scene: Scene, stack: Stack, weapon: Weapon, shots: Shots | None = None, shift: int = 0) -> QueryContext:
@@ -119,25 +136,6 @@ def _under_items(placements: Placements, pairs: Pairs, context: QueryContext) ->
     which, x_first, x_last = merged_runs(runs.placement * rows + y, runs.x_first, runs.x_last)
     runs = runs.take(which)
     return Runs(runs.placement, runs.y, x_first, x_last, runs.ordinal)
-
-
-def near_pairs(placements: Placements, which: Ints, boxes: Ints, context: QueryContext) -> tuple[Ints, Ints]:
-    """Pairs of placements and ranks of the items that they may touch, sorted; the plan records how they were found."""
-    candidates, plan = context.candidates, context.plan
-    row, rank = candidates.meeting(boxes)
-    placement = which[row]
-    made = row.nbytes + rank.nbytes + placement.nbytes
-    if index := candidates.index:
-        plan.run("broad phase", f"{index.structure}: {index.followed} boxes placed anew", made)
-        made = 0
-    if candidates.prefilter.volume:
-        plan.run("pre-filter", candidates.why, made)
-        near, met = candidates.near(placements, placement, rank), len(rank)
-        placement, rank = placement[near], rank[near]
-        plan.run("volumes", candidates.prefilter.name, near.nbytes + placement.nbytes + rank.nbytes, (len(rank), met))
-        made = 0
-    plan.run("pre-filter", candidates.why, made, (len(rank), len(which) * len(context.stack)))
-    return placement, rank
 
 
 def _kinds(rank: Ints, shot: Ints, shots: Shots, context: QueryContext) -> Kinds:
@@ -218,3 +216,41 @@ def _met(placements: Placements, runs: Runs, events: list[Events], counts: Ints,
     if placements.table.prefix is not None:
         plan.run("weights", "falloff of the hit pixels, by prefix sums", weight.nbytes)
     return SpanHits(under.placement, hit.rank, under.y, hit.x_first, hit.x_last, weight, counts)
+
+
+def rows_of_span_hits(met: SpanHits, placements: Placements, ids: Ints, first_shot: int) -> Rows:
+    """Add runs of hit pixels up to rows; a pixel hit by several pellets counts once in `pixels`."""
+    rounds = int(placements.round.max(initial=0)) + 1
+    shot, round_ = placements.shot[met.placement], placements.round[met.placement]
+    group = (shot * rounds + round_) * max(len(ids), 1) + met.rank
+    origin = placements.origin_xy[met.placement]
+    x = np.clip(origin[:, 0], met.x_first, met.x_last)  # the pixel of a run that is nearest to the origin
+    distance2 = (x - origin[:, 0]) ** 2 + (met.y - origin[:, 1]) ** 2
+    order = row_order(group, distance2, met.y, x)
+    group, distance2 = group[order], distance2[order]
+    new = begins(group)
+    first = np.flatnonzero(new)
+    best = order[first]
+    lengths = (met.x_last - met.x_first + 1)[order]
+    samples = np.add.reduceat(lengths, first) if len(first) else lengths
+    weight = np.add.reduceat(met.weight[order], first) if len(first) else lengths
+    pellets, pixels = np.ones_like(samples), samples
+    if int(placements.pellet.max(initial=0)):
+        pellets, pixels = _distinct(met, np.cumsum(new) - 1, order, len(first))
+    sort = row_order(shot[best], round_[best], distance2[first], met.y[best], x[best], met.rank[best])
+    best = best[sort]
+    return Rows(
+        shot[best] + first_shot, round_[best], ids[met.rank[best]], samples[sort], pixels[sort], weight[sort],
+        pellets[sort], np.stack([x[best], met.y[best]], axis=1), distance2[first][sort],
+    )  # fmt: skip
+
+
+def _distinct(met: SpanHits, group: Ints, order: Ints, groups: int) -> tuple[Ints, Ints]:
+    """Pellets that hit, and pixels counted once, of each group."""
+    of = int(met.placement.max(initial=0)) + 1
+    pellets = np.bincount(sorted_once(group * of + met.placement[order]) // of, minlength=groups)
+    y = met.y[order] - met.y.min(initial=0)
+    rows = int(y.max(initial=0)) + 1
+    which, x_first, x_last = merged_runs(group * rows + y, met.x_first[order], met.x_last[order])
+    pixels = np.bincount(group[which], x_last - x_first + 1, groups).astype(np.int64)
+    return pellets, pixels

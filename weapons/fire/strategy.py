@@ -21,8 +21,9 @@ from hitplanes.planes.scene.derived import View
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
+from .. import late
 from ..kinds.rays import RayWeapon, ends_at_first, is_moving, is_stepped, is_thin_first
-from .areas import Request, by_integers, by_labels, by_spans, by_tiles, by_visible_set, labels_for
+from .areas import Request, by_integers, by_labels, by_tiles, by_visible_set, labels_for
 from .hits import Rows
 from .prefilter import BOX, Candidates, prefilter_of
 
@@ -138,12 +139,16 @@ def _integers_cost(request: Request) -> tuple[float, float]:
     return now.integers_call + request.placements * each, 0.0
 
 
+def _by_spans(request: Request) -> list[Rows]:
+    return late.spans.by_spans(request)
+
+
 WAYS = (
     Way("integers", _integers_refuse, _integers_cost, by_integers),
     Way("labels", _labels_refuse, _labels_cost, by_labels),
     Way("visible", _visible_refuse, _visible_cost, by_visible_set),
     Way("tiles", _tiles_refuse, _tiles_cost, by_tiles),
-    Way("spans", lambda _: "", lambda request: (0.0 if _tiles_refuse(request) else inf, 0.0), by_spans),
+    Way("spans", lambda _: "", lambda request: (0.0 if _tiles_refuse(request) else inf, 0.0), _by_spans),
 )
 """All ways of areas. The reference costs more than any other, so it is chosen only where bit rows do not serve."""
 

@@ -19,11 +19,11 @@ from hitplanes.planes.common.backend import kernels_of
 from hitplanes.planes.common.checks import Ints
 
 from ..kinds.placements import placements_for
-from .areas import PLACEMENTS_AT_ONCE, Request, by_tiles, chunks, parts_of_batch, placed_of
+from .areas import PLACEMENTS_AT_ONCE, Request, by_tiles, parts_of_batch, placed_of
 from .hits import Rows
 from .plan import Plan
 from .prefilter import Candidates
-from .spans import direct
+from .spans import chunks, direct
 from .strategy import chosen_way
 
 

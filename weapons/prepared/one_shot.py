@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -19,10 +19,10 @@ from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.objects import Role
 from hitplanes.planes.scene.scene import Scene
 
+from .. import late
 from ..fire.hits import HitRow, Hits, Rows
 from ..fire.plan import Plan, absent, unaimed, undrawn
-from ..fire.prefilter import Candidates, may_refuse
-from ..fire.spans import QueryContext, SpanHits, direct
+from ..fire.prefilter import Candidates, QueryContext, may_refuse
 from ..kinds.areas import parts_of
 from ..kinds.placements import (
     STRAIGHT,
@@ -36,6 +36,9 @@ from ..kinds.placements import (
     placements_for,
 )
 from ..kinds.weapon import Pattern, PatternTable, Weapon
+
+if TYPE_CHECKING:
+    from ..fire.spans import SpanHits
 
 REACH_MOST = 500
 """Largest distance of a pixel from that of its round, px; larger patterns are left to `fire`."""
@@ -195,7 +198,7 @@ class OneShot(Hits, list[HitRow]):
         candidates = Candidates(present.scene.items, present.stack)
         pierce = parts_of(present.weapon)[2].pierce
         context = QueryContext(present.stack, present.bounds, pierce, candidates, self.plan, None)
-        return placements, direct(placements, self.shots, context)
+        return placements, late.spans.direct(placements, self.shots, context)
 
     def _counted(self) -> Ints:
         return np.asarray(self._met[1].counts.reshape(1, -1, len(OF_PATTERNS)).sum(axis=1))
