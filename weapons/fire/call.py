@@ -161,11 +161,7 @@ def fire_anew(
 ) -> Hits:
     """Decide what shots hit by what the scene keeps, not by weapons that are ready for it.
 
-    Parameters
-    ----------
-    filters : (accept, blocked_by, exclude)
-
-    The other arguments, and errors, are those of `fire`.
+    Arguments and errors are those of `fire`; `filters` are (accept, blocked_by, exclude).
     """
     plan, (accept, blocked_by, exclude) = Plan(), filters
     present = present_of(scene)
