@@ -293,7 +293,7 @@ def _inside(folder: Path, text: str) -> Path:
 def _object_json(scene: Scene, row: int, source: dict[str, Any]) -> dict[str, Any]:
     """An object with its source as JSON; what it has by default is left out."""
     items, form = scene.items, scene.items.forms[row]
-    item, bits, default = int(items.id[row]), int(items.categories[row]), default_bits(ROLES[items.role[row]])
+    item, bits = int(items.id[row]), int(items.categories[row])
     pose = {
         "angle": (items.angles[row], 0),
         "scale": ([form.scale_x / ONE, form.scale_y / ONE], [1, 1]),
@@ -302,10 +302,12 @@ def _object_json(scene: Scene, row: int, source: dict[str, Any]) -> dict[str, An
         "layer": (int(items.layer[row]), 0),
         "cost": (int(items.cost[row]), 1),
         "velocity_xy": ((items.velocity_256[row] / SUB).tolist(), [0, 0]),
-        "categories": (scene.category_names(bits), scene.category_names(default)),
+        "categories": (bits, default_bits(ROLES[items.role[row]])),
         "owner": (int(items.owner[row]), item),
     }
-    told = {key: value for key, (value, usual) in pose.items() if value != usual}
+    told: dict[str, Any] = {key: value for key, (value, usual) in pose.items() if value != usual}
+    if "categories" in told:
+        told["categories"] = scene.category_names(bits)
     xy = (items.position_256[row] / SUB).tolist()
     return {"id": item, "name": items.names[row], **source, "position_xy": xy, **told}
 
