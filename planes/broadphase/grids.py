@@ -170,7 +170,7 @@ class Grid(BroadPhase):
         return found
 
     def _in_cells(self, queries: Floats, query: Ints, at: Ints, home: int, work: Work | None) -> list[Pairs]:
-        """Search cells; both boxes of a pair may share several, so repeats are dropped, some at a time."""
+        """Search cells; both boxes of a pair may share several, so repeats are dropped before they are tested."""
         listing = self._listings[home - MAIN]
         start, length = listing.runs(self._keys(at))
         if work is not None and len(listing.key):
@@ -189,9 +189,9 @@ class Grid(BroadPhase):
             if home == MAIN and self._stale:
                 keep = np.flatnonzero(self._home.take(box) == MAIN)
                 box, asked = box.take(keep), asked.take(keep)
+            asked, box = sorted_pairs(asked, box, self._count, once=True)
             good = np.flatnonzero(self._meeting(queries, asked, box, work))
-            asked, box = sorted_pairs(asked.take(good), box.take(good), self._count, once=True)
-            found.append((asked, box))
+            found.append((asked.take(good), box.take(good)))
         return found
 
     def _enter(self, ids: Ints) -> None:
