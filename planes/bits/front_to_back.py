@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 FRONTS_AT_ONCE = 2**14
 """Most pairs of tiles near the same placement that are all listed; of more, only those that meet are listed."""
 
+COLUMNS = 8
+"""Numbers that a pair takes beside its rows."""
+
 NO_FLAGS, NO_NUMBERS = np.zeros(0, np.bool_), np.zeros(0, np.int64)
 
 
@@ -148,7 +151,7 @@ def front_to_back(
     pairs, height = _near(placed, windows, tiles, rule, near)
     hides = not rule.pierce or len(tiles.occluder) > 0
     parts = []
-    for these in _parts(pairs, max(bit_rows.WORDS_AT_ONCE // height, 1), each):
+    for these in _parts(pairs, max(bit_rows.WORDS_AT_ONCE // (height + COLUMNS), 1), each):
         part, rows = these, _shared(placed, windows, tiles, these, height)
         if hides:
             kept = np.bitwise_or.reduce(rows, axis=1).nonzero()[0]
