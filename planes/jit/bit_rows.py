@@ -279,10 +279,8 @@ def _strip_of(parts, y, at, end, strip):
         for part in range(len(parts)):
             first, last = parts[part, 0, i], parts[part, 1, i]
             if first <= last:
-                low, high = (
-                    min(low, b * y[i] + min(a * first, a * last)),
-                    max(high, b * y[i] + max(a * first, a * last)),
-                )
+                low = min(low, b * y[i] + min(a * first, a * last))
+                high = max(high, b * y[i] + max(a * first, a * last))
     strip[2], strip[3] = low, high
 
 

@@ -16,7 +16,7 @@ from ..grid.spans import WIDEST, RowRuns, pieces
 from ..grid.turns import Edges
 from ..scene.sprite import frozen
 from ..scene.variants import Grids, Turned
-from .bit_rows import BOXES, INTS, OUT
+from .bit_rows import BOXES, FLAGS, INTS, OUT
 from .cache import compiled, helper
 from .scene import PARTS, PELLETS, STEPS, add_run, at_least, at_most, empty_parts, layout, root_of
 
@@ -357,14 +357,10 @@ def bounds_of_times(left, top, right, low, ray, wide):
     x, y, dx, dy, _, _ = ray
     reach, length2 = wide[2], wide[3]
     left, right, top, low = SUB * left - x, SUB * right - x, SUB * top - y, SUB * low - y
-    u_least, u_most = (
-        min(left * dx, right * dx) + min(top * dy, low * dy),
-        max(left * dx, right * dx) + max(top * dy, low * dy),
-    )
-    v_least, v_most = (
-        min(left * dy, right * dy) - max(top * dx, low * dx),
-        max(left * dy, right * dy) - min(top * dx, low * dx),
-    )
+    u_least = min(left * dx, right * dx) + min(top * dy, low * dy)
+    u_most = max(left * dx, right * dx) + max(top * dy, low * dy)
+    v_least = min(left * dy, right * dy) - max(top * dx, low * dx)
+    v_most = max(left * dy, right * dy) - min(top * dx, low * dx)
     if v_least > reach or v_most < -reach or u_least - reach - 2 > length2 or u_most + reach + 2 < 0:
         return np.int64(1), np.int64(0)
     return max(u_least - reach - 2, 0), u_most + reach + 2
@@ -421,9 +417,6 @@ def half_chord(radius, v, length2):
         return root_of(root * root + left)
     step = left // (2 * root)
     return root + step - (left - 2 * root * step - step * step < 0)
-
-
-MASKS = types.Array(types.boolean, 1, "C", readonly=True)
 
 
 PLACE_BITS = 40
@@ -502,7 +495,7 @@ def _map(flat, frame, first, step, unit, size_wh, held):
 
 
 @compiled(types.Tuple((types.int64[:, ::1], types.boolean[::1]))(
-    MASKS, PELLETS, INTS, PELLETS, STEPS, PELLETS, PELLETS
+    FLAGS, PELLETS, INTS, PELLETS, STEPS, PELLETS, PELLETS
 ))  # fmt: skip
 def _turned_masks(flat, frames, which, first, step, unit, size_wh):
     boxes, room, most, used = np.empty((len(which), 6), np.int64), 0, 0, 0

@@ -205,12 +205,8 @@ def _winding(ring):
     count, changes, right, left, level = len(ring), 0, 0, 0, True
     for i in range(count):
         j, k = (i + 1) % count, (i + 2) % count
-        dx, dy, next_x, next_y = (
-            ring[j, 0] - ring[i, 0],
-            ring[j, 1] - ring[i, 1],
-            ring[k, 0] - ring[j, 0],
-            ring[k, 1] - ring[j, 1],
-        )
+        dx, dy = ring[j, 0] - ring[i, 0], ring[j, 1] - ring[i, 1]
+        next_x, next_y = ring[k, 0] - ring[j, 0], ring[k, 1] - ring[j, 1]
         turn = dx * next_y - dy * next_x
         right, left, level = right + (turn > 0), left + (turn < 0), level and dy == 0
         changes += (dy < 0) != (next_y < 0)
@@ -503,7 +499,6 @@ def place(
     return True
 
 
-ANY_INTS = types.Array(types.int64, 1, "A", readonly=True)
 SEEDS = types.Array(types.uint64, 1, "A", readonly=True)
 
 AT_ONCE = 256  # least number of pellets that are drawn at a time; those of a round are drawn together
@@ -516,7 +511,7 @@ def _mixed(z):
     return z ^ (z >> np.uint64(31))
 
 
-@compiled(types.void(types.int64, types.int64, types.uint64, SEEDS, ANY_INTS, ANY_INTS, PELLETS, types.int64[:, ::1]))
+@compiled(types.void(types.int64, types.int64, types.uint64, SEEDS, INTS, INTS, PELLETS, types.int64[:, ::1]))
 def _disc_offsets(reach, radius2, bits, seed, shot, round_, pellet, offsets):
     rows, pellets = pellet.shape
     room = max(AT_ONCE, pellets)
