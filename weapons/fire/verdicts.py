@@ -38,11 +38,11 @@ def verdicts_of(request: Request, rows: Rows, way: str) -> Ints:
     """
     stack, items = request.stack, request.scene.items
     gone = items.stack().forms != stack.forms
-    request = replace(request, candidates=Candidates(items, stack), filtered=False, plan=Plan())  # not that of the call
+    first = replace(request, candidates=Candidates(items, stack), filtered=False, plan=Plan())  # not that of the call
     if way == "spans" or gone or request.blockers is not None or not request.traits.fits:
-        return _by_spans(request)
-    view = request.view and request.view._replace(pierce=False)
-    fired, inside, first = _fired_and_inside(replace(request, view=view, pierce=False))
+        return _by_spans(first)
+    first.pierce, first.view = False, request.view and request.view._replace(pierce=False)
+    fired, inside = _fired_and_inside(first)
     hit = _samples(_rows(first) if request.pierce else rows, len(fired))
     occluded = np.zeros_like(hit)
     if stack.has_occluders:
@@ -71,8 +71,8 @@ def _rows(request: Request) -> Rows:
     return Rows.joined(chosen_way("auto", request)[0].engine(request))
 
 
-def _fired_and_inside(request: Request) -> tuple[Ints, Ints, Request]:
-    """Samples (N,) of shots, and those within the bounds; and the request with its placements, unless they are many."""
+def _fired_and_inside(request: Request) -> tuple[Ints, Ints]:
+    """Samples (N,) of shots, and those within the bounds; the request keeps the placements, unless they are many."""
     bounds, each = request.bounds, request.traits.placements
     fired, within = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
     placements = None
@@ -83,8 +83,8 @@ def _fired_and_inside(request: Request) -> tuple[Ints, Ints, Request]:
             inside = kernels_of(bit_rows).pixels_within(placed_of(placements), table.bits, table.count, bounds)
         fired.append(count if each == 1 else count.reshape(-1, each).sum(axis=1))
         within.append(inside if each == 1 else inside.reshape(-1, each).sum(axis=1))
-    placed = placements if len(fired) == 2 else None
-    return np.concatenate(fired), np.concatenate(within), replace(request, placed=placed)
+    request.placed = placements if len(fired) == 2 else None
+    return np.concatenate(fired), np.concatenate(within)
 
 
 def _by_spans(request: Request) -> Ints:
