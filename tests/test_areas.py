@@ -37,6 +37,7 @@ from hitplanes.planes.common.checks import Bools
 from hitplanes.planes.common.limits import ALL
 from hitplanes.planes.scene import variants as variants_module
 from hitplanes.weapons.fire import areas
+from hitplanes.weapons.fire import spans as spans_module
 from hitplanes.weapons.fire import strategy as strategy_module
 from hitplanes.weapons.fire import verdicts as verdicts_module
 from hitplanes.weapons.fire.strategy import chosen_way
@@ -66,7 +67,7 @@ PARTS: dict[str, dict[str, int]] = {
 }  # fmt: skip
 """Limits that cut a batch, and choose between two ways to do the same."""
 
-OWNERS = areas, strategy_module, weapon_module, tiles, bit_rows, front_to_back, cells, visible
+OWNERS = areas, spans_module, strategy_module, weapon_module, tiles, bit_rows, front_to_back, cells, visible
 
 
 @pytest.fixture

@@ -484,9 +484,10 @@ def test_seeds_stay_with_their_shots_in_the_parts_of_a_batch(
     weapon, seeds = Spread(Disc(1, falloff=falloff), count=5, radius=20), np.arange(40, dtype=np.uint64)
     whole = fire(scene, weapon, [(30, 30)] * 40, seed=seeds, shot=3, strategy=strategy)
     assert whole and whole.fired.sum() == 1000  # verdicts are counted
-    monkeypatch.setattr("hitplanes.weapons.fire.areas.CHUNK_SAMPLES", 150)
+    monkeypatch.setattr("hitplanes.weapons.fire.spans.CHUNK_SAMPLES", 150)
     monkeypatch.setattr("hitplanes.weapons.fire.areas.PLACEMENTS_AT_ONCE", 35)
     monkeypatch.setattr("hitplanes.weapons.fire.areas.CHUNK_PAIRS", 35)
+    monkeypatch.setattr("hitplanes.weapons.fire.spans.CHUNK_PAIRS", 35)
     assert fire(scene, weapon, [(30, 30)] * 40, seed=seeds, shot=3, strategy=strategy) == whole
 
 
