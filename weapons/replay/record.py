@@ -44,7 +44,7 @@ from hitplanes.planes.common.tables import (
     json_of,
     typed,
 )
-from hitplanes.planes.files.png import check_output
+from hitplanes.planes.files.png import check_output, possible
 from hitplanes.planes.grid.fixed_point import ONE, snap
 from hitplanes.planes.scene.history import History, PastScene
 from hitplanes.planes.scene.scene import Scene
@@ -115,10 +115,8 @@ class ShotRecord:
     def __init__(self, path: str | Path) -> None:
         self.path = path_of("record", path)
         check_output(self.path)
-        try:
+        with possible(f"record: expected a new file, got {self.path}"):
             self._file = self.path.open("xb", buffering=0)
-        except OSError as error:
-            raise InputError(f"record: expected a new file, got {self.path}: {error.strerror}") from error
         self._hashes = Hashes()
         self._lock = Lock()
         self._chain, self._size, self._shots = Chain(), 0, 0
@@ -307,12 +305,9 @@ def replayed(
 ) -> tuple[Difference | None, bool]:
     """Return what `replay` returns, and whether the end of the record is missing."""
     path = path_of("record", path)
-    try:
-        with path.open("rb") as lines:
-            reading = Reading(path, lines)
-            return _first_difference(path, _groups(iter(reading)), scene), reading.endless
-    except OSError as error:
-        raise InputError(f"{path}: cannot read it: {error.strerror}") from error
+    with possible(f"{path}: cannot read it"), path.open("rb") as lines:
+        reading = Reading(path, lines)
+        return _first_difference(path, _groups(iter(reading)), scene), reading.endless
 
 
 class Recorded(NamedTuple):

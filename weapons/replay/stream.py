@@ -15,7 +15,7 @@ import shutil
 import time
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib.metadata import version
 from itertools import pairwise
@@ -27,7 +27,7 @@ import numpy as np
 
 from hitplanes.planes.bits.span_walk import OF_PATTERNS
 from hitplanes.planes.common.checks import InputError, path_of, printable, within
-from hitplanes.planes.files.png import check_output, put_in_place
+from hitplanes.planes.files.png import check_output, possible, put_in_place
 from hitplanes.planes.scene.objects import Role
 from hitplanes.planes.scene.scene import Scene
 
@@ -139,9 +139,10 @@ class Part:
 
     def __init__(self, output: Path, header: bytes) -> None:
         self.output, self.path = output, self.path_of(output)
+        self._writing = f"output: cannot write {self.path}"
         for path in (self.output, self.path):
             check_output(path)
-        with self._errors_named():
+        with possible(self._writing):
             self._file = os.open(self.path, FLAGS, 0o666)
         try:
             self._hold()
@@ -168,7 +169,7 @@ class Part:
 
     def lines(self) -> Iterator[bytes]:
         """Yield the intact lines of an older part after its header; `cut` drops all behind the last one taken."""
-        with self._errors_named(), self.path.open("rb") as file:
+        with possible(self._writing), self.path.open("rb") as file:
             file.seek(self._end)
             for number, line in enumerate(file, 2):
                 if not line.endswith(b"\n"):
@@ -183,7 +184,7 @@ class Part:
 
     def cut(self) -> None:
         """Truncate the file after the last intact line, and write from there on."""
-        with self._errors_named():
+        with possible(self._writing):
             os.ftruncate(self._file, self._end)
             os.lseek(self._file, self._end, os.SEEK_SET)
 
@@ -205,13 +206,13 @@ class Part:
 
     def _put(self, data: bytes) -> None:
         view = memoryview(data)
-        with self._errors_named():
+        with possible(self._writing):
             while len(view):
                 view = view[os.write(self._file, view) :]
 
     def finish(self) -> None:
         """Rename the part, now complete, to the output."""
-        with self._errors_named():
+        with possible(self._writing):
             if fcntl is None:
                 os.close(self._file)
                 self._file = -1
@@ -221,20 +222,20 @@ class Part:
         """Lock the file for this process."""
         if fcntl is None:
             return
-        busy = InputError(f"output: cannot write {self.path}: another process is writing it")
+        busy = InputError(f"{self._writing}: another process is writing it")
         try:
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
             raise busy from error
         except OSError:  # a file system without locks
             return
-        with self._errors_named():
+        with possible(self._writing):
             if not self.path.exists() or not os.path.samestat(os.fstat(self._file), self.path.stat()):
                 raise busy  # the process that held the lock has renamed it
 
     def _check(self, header: bytes) -> None:
         """Write the header of a new part, or compare that of an older one."""
-        with self._errors_named():
+        with possible(self._writing):
             found = os.read(self._file, len(header))
             if found == header:
                 return
@@ -245,13 +246,6 @@ class Part:
             os.lseek(self._file, 0, os.SEEK_SET)
             found = os.read(self._file, HEADER_MAX)
         raise InputError(f"{self.path}: {_difference(header, found)}: remove it to start anew")
-
-    @contextmanager
-    def _errors_named(self) -> Iterator[None]:
-        try:
-            yield
-        except OSError as error:
-            raise InputError(f"output: cannot write {self.path}: {error.strerror}") from error
 
 
 def _difference(header: bytes, found: bytes) -> str:
@@ -327,7 +321,7 @@ def fire_log(scene: Scene, log: Path, output: Path, progress: Progress) -> Strea
     """
     log, output = path_of("log", log), path_of("output", output)
     reader = ShotReader(scene, weapons_of(scene), str(log))
-    with _opened(log) as lines:
+    with possible(f"{log}: cannot read it"), log.open("rb") as lines:
         _check_places(lines, output)
         with Part(output, _header(scene, reader)) as part:
             done = Streamed()
@@ -356,15 +350,6 @@ def _check_places(lines: BinaryIO, output: Path) -> None:
     for path in (output, Part.path_of(output)):
         if path.exists() and os.path.samestat(path.stat(), os.fstat(lines.fileno())):
             raise InputError(f"output: expected another file than the log, got {output}")
-
-
-@contextmanager
-def _opened(log: Path) -> Iterator[BinaryIO]:
-    try:
-        with log.open("rb") as lines:
-            yield lines
-    except OSError as error:
-        raise InputError(f"{log}: cannot read it: {error.strerror}") from error
 
 
 def _header(scene: Scene, reader: ShotReader) -> bytes:
