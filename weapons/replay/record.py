@@ -500,17 +500,17 @@ def _result_lines(scene: Scene, was: Entry, now: Entry) -> Iterator[str]:
 
 def _lines(scene: Scene, was: Entry, now: Entry) -> Iterator[str]:
     whole = set()
-    for old, new in pairs(was.get("rows"), now.get("rows"), "round", "object"):
+    for row, old, new in pairs(was.get("rows"), now.get("rows"), "round", "object"):
         if old is None or new is None:
-            whole.add(key_of(old or new or {}, "round", "object"))
-        yield from _compared(f"{_item(scene, old or new)}{_of(old or new, 'round')}", old, new, ("round", "object"))
+            whole.add(key_of(row, "round", "object"))
+        yield from _compared(f"{_item(scene, row)}{_of(row, 'round')}", old, new, ("round", "object"))
     names = "round", "pellet", "object"
-    for old, new in pairs(was.get("passes"), now.get("passes"), *names):
-        if key_of(old or new or {}, "round", "object") not in whole:
-            through = f"pass{_of(old or new, 'round', 'pellet')} through {_item(scene, old or new)}"
+    for entry, old, new in pairs(was.get("passes"), now.get("passes"), *names):
+        if key_of(entry, "round", "object") not in whole:
+            through = f"pass{_of(entry, 'round', 'pellet')} through {_item(scene, entry)}"
             yield from _compared(through, old, new, names)
-    for old, new in pairs(was.get("stops"), now.get("stops"), "round", "pellet"):
-        ray = f"ray{_of(old or new, 'round', 'pellet')}"
+    for stop, old, new in pairs(was.get("stops"), now.get("stops"), "round", "pellet"):
+        ray = f"ray{_of(stop, 'round', 'pellet')}"
         if old is None or new is None or _stopped(scene, old) == _stopped(scene, new):
             yield from _compared(ray, old, new, ("round", "pellet"))
         else:
@@ -530,14 +530,14 @@ def _compared(what: str, was: Entry | None, now: Entry | None, names: Sequence[s
         yield f"{what}: {'; '.join(text.replace(': ', ' ', 1) for text in texts)}"
 
 
-def _of(entry: Entry | None, *names: str) -> str:
+def _of(entry: Entry, *names: str) -> str:
     """Return the text for round and pellet, without those that are 0."""
-    texts = [f"{name} {number_of(entry[name])}" for name in names if entry and entry.get(name)]
+    texts = [f"{name} {number_of(entry[name])}" for name in names if entry.get(name)]
     return f" of {', '.join(texts)}" if texts else ""
 
 
-def _item(scene: Scene, entry: Entry | None, key: str = "object", word: str = "object") -> str:
-    item: Any = (entry or {}).get(key)
+def _item(scene: Scene, entry: Entry, key: str = "object", word: str = "object") -> str:
+    item: Any = entry.get(key)
     known = isinstance(item, int) and 0 <= item < scene.items.count
     return f"{word} {number_of(item)}{f' {scene.name_of(item)!r}' if known else ''}"
 

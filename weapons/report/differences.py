@@ -17,6 +17,7 @@ from .phrases import (
     ABSENT,
     LINES_MAX,
     Entry,
+    Pair,
     by_path,
     entries,
     first_of,
@@ -34,8 +35,8 @@ def ray_changes(was: Entry, now: Entry) -> list[str] | None:
     """Lines about the changed rays of a shot, from any JSON; None if there are no words for the change."""
     known = [*entries(was["rays"]), *entries(now["rays"])]
     lines = []
-    for before, after in pairs(was["rays"], now["rays"], "round", "pellet"):
-        name = _ray_name(after or before or {}, known)
+    for ray, before, after in pairs(was["rays"], now["rays"], "round", "pellet"):
+        name = _ray_name(ray, known)
         if before is None or after is None:
             lines.append(f"{name} is {'new' if before is None else 'missing'}")
         else:
@@ -77,8 +78,7 @@ def _stop(was: Any, now: Any) -> list[str] | None:
 
 def _passes(was: Any, now: Any) -> list[str] | None:
     lines = []
-    for before, after in pairs(was, now, "object"):
-        entry = after or before or {}
+    for entry, before, after in pairs(was, now, "object"):
         name = _name(entry)
         if before is None or after is None:
             lines.append(f"{'newly' if before is None else 'no longer'} goes through {name}{_way(entry)}")
@@ -188,8 +188,7 @@ def _weapons(was: Entry, now: Entry) -> list[str] | None:
 def _shots(was: Entry, now: Entry) -> list[str] | None:
     groups = []
     numbers = {id(shot): number for side in (was, now) for number, shot in enumerate(entries(side["shots"]))}
-    for before, after in _paired_shots(entries(was["shots"]), entries(now["shots"])):
-        shot = after or before or {}
+    for shot, before, after in _paired_shots(entries(was["shots"]), entries(now["shots"])):
         title = f"shot {numbers.get(id(shot), 0)} ({unquoted(shot.get('weapon'))} at {_place(shot.get('at'))})"
         if before is None or after is None:
             groups.append([f"{title} is {'missing' if after is None else 'new'}"])
@@ -233,8 +232,7 @@ def _rows(was: Entry, now: Entry) -> list[str] | None:
     rounds = any(row.get("round") != 0 for row in [*entries(was["rows"]), *entries(now["rows"])])
     reasons = [{key_of(e, "object"): e for e in entries(shot.get("why_not"))} for shot in (was, now)]
     lines = []
-    for before, after in pairs(was["rows"], now["rows"], "object", "round"):
-        row = after or before or {}
+    for row, before, after in pairs(was["rows"], now["rows"], "object", "round"):
         name = _name(row) + (f", round {shown(row.get('round'))}" if rounds else "")
         why = reasons[after is None].get(key_of(row, "object"))
         lines += _row(name, before, after, "" if why is None else reason(why))
@@ -261,8 +259,8 @@ def _row(name: str, was: Entry | None, now: Entry | None, why: str) -> list[str]
 
 def _blockers(was: Entry, now: Entry) -> list[str] | None:
     lines = []
-    for before, after in pairs(was["blockers"], now["blockers"], "object"):
-        name = _name(after or before or {})
+    for entry, before, after in pairs(was["blockers"], now["blockers"], "object"):
+        name = _name(entry)
         if after is None:
             lines.append(f"{name} no longer blocks")
         elif before is None:
@@ -276,11 +274,10 @@ def _blocker(was: Entry, now: Entry) -> list[str]:
     parts = []
     if not same(was.get("samples"), now.get("samples")):
         parts = [f"ends {_count(now.get('samples'), 'sample')}, was {shown(was.get('samples'))}"]
-    for before, after in pairs(was.get("blocked"), now.get("blocked"), "object"):
+    for entry, before, after in pairs(was.get("blocked"), now.get("blocked"), "object"):
         counts = [0 if side is None else side.get("samples") for side in (before, after)]
         if not same(*counts):
-            name = _name(after or before or {})
-            parts.append(f"in front of {name}: {_count(counts[1], 'sample')}, was {shown(counts[0])}")
+            parts.append(f"in front of {_name(entry)}: {_count(counts[1], 'sample')}, was {shown(counts[0])}")
     return parts or [f"as a blocker: {line}" for line in first_of(by_path("", was, now))]
 
 
@@ -289,8 +286,7 @@ def _why_not(was: Entry, now: Entry) -> list[str] | None:
     hits = [{key_of(row, "object") for row in entries(shot.get("rows"))} for shot in (was, now)]
     changed = hits[0] ^ hits[1]
     lines = []
-    for before, after in pairs(was["why_not"], now["why_not"], "object"):
-        entry = after or before or {}
+    for entry, before, after in pairs(was["why_not"], now["why_not"], "object"):
         if key_of(entry, "object") in changed:
             continue
         if before is None or after is None:
@@ -335,8 +331,7 @@ def _batch_rows(was: Entry, now: Entry) -> list[str] | None:
         names = {text_of_json(entry.get("object")): entry.get("name") for entry in entries(batch.get("objects"))}
         sides.append([_as_row(row, names) for row in batch["rows"] if text_of_json(row) not in others])
     lines = []
-    for old, new in pairs(sides[0], sides[1], "shot", "object", "round"):
-        row = new or old or {}
+    for row, old, new in pairs(sides[0], sides[1], "shot", "object", "round"):
         name = f"shot {shown(row['shot'])}: {_name(row)}"
         lines += _row(name + (f", round {shown(row['round'])}" if row["round"] else ""), old, new, "")
     return first_of(lines) or None
@@ -349,14 +344,16 @@ def _as_row(row: Any, names: Mapping[str, Any]) -> dict[str, Any]:
     return {**fields, "first_xy": first_xy, "name": names.get(text_of_json(fields["object"]))}
 
 
-def _paired_shots(was: list[Entry], now: list[Entry]) -> Iterator[tuple[Entry | None, Entry | None]]:
-    """Pairs of shots by their places in the lists or, if a shot was added or removed, by how they were fired."""
-    if len(was) == len(now):
-        yield from zip(was, now, strict=True)
-        return
-    keys = [[key_of(shot, "weapon", "at", "aim") for shot in shots] for shots in (was, now)]
-    for _, first, last, begin, end in difflib.SequenceMatcher(a=keys[0], b=keys[1], autojunk=False).get_opcodes():
-        yield from itertools.zip_longest(was[first:last], now[begin:end])
+def _paired_shots(was: list[Entry], now: list[Entry]) -> Iterator[Pair]:
+    """Pair shots by their places in the lists or, if a shot was added or removed, by how they were fired."""
+    parts = [[0, len(was), 0, len(now)]]
+    if len(was) != len(now):
+        keys = [[key_of(shot, "weapon", "at", "aim") for shot in shots] for shots in (was, now)]
+        matcher = difflib.SequenceMatcher(a=keys[0], b=keys[1], autojunk=False)
+        parts = [places for _, *places in matcher.get_opcodes()]
+    for first, last, begin, end in parts:
+        for before, after in itertools.zip_longest(was[first:last], now[begin:end]):
+            yield before if after is None else after, before, after
 
 
 def _gained_and_lost(was: Any, now: Any) -> list[str]:

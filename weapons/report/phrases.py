@@ -41,11 +41,15 @@ def by_path(path: str, was: Any, now: Any) -> Iterator[str]:
         yield f"{path}: {shown(now)}, was {shown(was)}"
 
 
-def pairs(was: Any, now: Any, *names: str) -> Iterator[tuple[Entry | None, Entry | None]]:
-    """Pairs of entries of two lists that agree in the named fields, in the order of the first list, then the second."""
+Pair = tuple[Entry, Entry | None, Entry | None]
+"""The present entry, or the earlier one if it is gone, to name both by; then the earlier and the present one."""
+
+
+def pairs(was: Any, now: Any, *names: str) -> Iterator[Pair]:
+    """Pair the entries of two lists that agree in the named fields, in the order of the first list, then the second."""
     before, after = ({key_of(entry, *names): entry for entry in entries(side)} for side in (was, now))
-    for key in dict.fromkeys([*before, *after]):
-        yield before.get(key), after.get(key)
+    for key in before | after:
+        yield (before | after)[key], before.get(key), after.get(key)
 
 
 def entries(value: Any) -> list[Entry]:
