@@ -102,7 +102,7 @@ def test_every_sample_is_marked_with_its_shape() -> None:
     factor, view = 8, (2, 3, 20, 19)
     for verdict, runs in samples.items():
         world = blank(None, view, factor)
-        world.mark_samples(report["shots"], verdict)
+        world.mark_samples([{"samples": {verdict: runs}}])
         wanted = np.zeros(world.image.shape[:2], np.bool_)
         for y, first, last in runs:
             for x in range(max(first, 2), last + 1):
@@ -268,15 +268,13 @@ def test_the_legend_has_what_the_picture_has() -> None:
     words = [entry.word for entry in legend_of(report, world.painted, 900).entries]
     assert words == []
     world = World(scene, None, tuple(report["view_xyxy"]), 8)
-    for verdict in MARKS:
-        world.mark_samples(report["shots"], verdict)
+    world.mark_samples(report["shots"])
     words = [entry.word for entry in legend_of(report, world.painted, 900).entries]
     assert words == ["hit", "occluded", "empty", "occluder"]
     far = told(scene, (Disc(1), (-4000, 5)))
     picture_of_report(far, scene)
     world = World(scene, None, tuple(far["view_xyxy"]), 8)
-    for verdict in MARKS:
-        world.mark_samples(far["shots"], verdict)
+    world.mark_samples(far["shots"])
     assert "outside" not in [entry.word for entry in legend_of(far, world.painted, 900).entries]
 
 

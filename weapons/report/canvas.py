@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import unicodedata
-from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence, Set
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -14,10 +14,23 @@ from hitplanes.planes.common.checks import Bools, Floats, Image, Ints
 from hitplanes.planes.files.png import cv2
 from hitplanes.planes.grid.spans import Box, Spans, each_pixel
 from hitplanes.planes.scene.objects import Role
-from hitplanes.planes.scene.render import GROUND, blend, draw_view
+from hitplanes.planes.scene.render import GROUND, draw_view
 from hitplanes.planes.scene.scene import Scene
 
-from .symbols import HEAT, LET_THROUGH, MARK_GROUND, MARKS, SIGNS, SKETCH, TINT, Strokes, glyph, sign_mark, tiled_glyph
+from .symbols import (
+    HEAT,
+    MARKS,
+    SIGNS,
+    SKETCH,
+    TINT,
+    Color,
+    mark_of,
+    paint,
+    sign_mark,
+    sketch_mark,
+    tiled_glyph,
+    verdict_mark,
+)
 
 if TYPE_CHECKING:
     from .cards import Card
@@ -83,15 +96,17 @@ class World:
             occluding = np.isin(id_plane(scene.items.stack(), view), scene.ids(Role.OCCLUDER) + 1)
             if occluding.any():
                 self.painted.add("occluder")
-                _lay(self.image, enlarged(occluding, factor) & _stripes(self.image.shape, 12, 2), HATCH, 80)
+                paint(self.image, HATCH, (enlarged(occluding, factor) & _stripes(self.image.shape, 12, 2)) * 80)
 
     def placed(self, points: Floats) -> Floats:
         """Points (n, 2) of the world in coordinates of the picture."""
         return np.asarray((points - self.view[:2] + 0.5) * self.factor)
 
-    def mark_samples(self, shots: Sequence[Mapping[str, Any]], verdict: str) -> None:
-        """Mark the samples of one verdict, each with the verdict's shape."""
-        self.lay(covered(self.view, [shot["samples"].get(verdict, ()) for shot in shots]), verdict)
+    def mark_samples(self, shots: Sequence[Mapping[str, Any]], of_rays: Container[str] = MARKS) -> None:
+        """Mark the samples of all shots, each with the shape of its verdict; of rays only those of some verdicts."""
+        for verdict in MARKS:
+            marked = [shot["samples"] for shot in shots if "rays" not in shot or verdict in of_rays]
+            self.lay(covered(self.view, [samples.get(verdict, ()) for samples in marked]), verdict)
 
     def lay(self, at: Bools, verdict: str) -> None:
         """Mark the set pixels of a plane (h, w) of the view with the shape of a verdict."""
@@ -103,11 +118,11 @@ class World:
         part = enlarged(at[y0 : rows.max() + 1, x0 : columns.max() + 1], self.factor)
         shape = tiled_glyph(verdict, self.factor, part.shape)
         color, alpha = MARKS[verdict]
-        window = self.image[y0 * self.factor :, x0 * self.factor :]
+        window = self.image[y0 * self.factor :, x0 * self.factor :][: part.shape[0], : part.shape[1]]
         if verdict == "hit":
-            _lay(window, part, SHADOW, SHADOW_ALPHA)
-        _lay(window, part, color, TINT)
-        _lay(window, part & shape, color, alpha)
+            paint(window, SHADOW, part * SHADOW_ALPHA)
+        paint(window, color, part * TINT)
+        paint(window, color, (part & shape) * alpha)
 
     def mark_heat(self, batch: Mapping[str, Any], verdict: str) -> None:
         """Colour each cell by its number of samples of one verdict, on a logarithmic scale; ring those that lie alone.
@@ -126,11 +141,11 @@ class World:
         color, alpha = MARKS[verdict]
         if verdict == "hit":
             colors = np.array(HEAT, np.uint8)[np.maximum(steps, 1) - 1]
-            blend(self.image, enlarged(colors, self.factor), np.where(there, HEAT_ALPHA, 0).astype(np.uint8), 0, 0)
+            paint(self.image, enlarged(colors, self.factor), there * HEAT_ALPHA)
         elif of_rays and verdict in ("empty", "outside"):
-            _lay(self.image, there, color, LINE_ALPHA)
+            paint(self.image, color, there * LINE_ALPHA)
         else:
-            _lay(self.image, there & tiled_glyph(verdict, self.factor, there.shape), color, alpha // 2)
+            paint(self.image, color, (there & tiled_glyph(verdict, self.factor, there.shape)) * (alpha // 2))
         if verdict == "hit" or (of_rays and verdict == "occluded"):
             self._ring_lone(steps > 0, color)
 
@@ -149,12 +164,9 @@ class World:
         if self.scene is not None:
             self.border(*self.scene.mask(item), kind)
 
-    def outline_shadows(self, shots: Sequence[Mapping[str, Any]]) -> None:
-        """Draw the edges of what items on the way shelter from each shot, as people draw light."""
-        for shot in shots:
-            runs = np.array(shot.get("sheltered", ()), np.int64).reshape(-1, 3)
-            if len(runs):
-                self.border(*Spans(*runs.T).to_mask(), "shadow")
+    def outline_runs(self, runs: Sequence[Sequence[int]], kind: str) -> None:
+        """Draw the border of the pixels of runs [y, x_first, x_last]."""
+        self.border(*Spans(*np.array(runs, np.int64).reshape(-1, 3).T).to_mask(), kind)
 
     def outline_seen(self, items: Sequence[int]) -> None:
         """Draw the borders of the visible parts of at most OUTLINES_MAX objects."""
@@ -189,7 +201,8 @@ class World:
         if kind in DASHED:
             border &= _stripes(border.shape, 2 * DASH, DASH)
         window = self.image[(top - view[1]) * factor : (low - view[1]) * factor]
-        _lay(window[:, (left - view[0]) * factor : (right - view[0]) * factor], border, *OUTLINES[kind])
+        color, alpha = OUTLINES[kind]
+        paint(window[:, (left - view[0]) * factor : (right - view[0]) * factor], color, border * alpha)
 
 
 def heat_boxes(heat: Mapping[str, Any], verdict: str) -> Iterator[tuple[int, Box]]:
@@ -252,33 +265,6 @@ def _stripes(shape: tuple[int, ...], period: int, wide: int) -> Bools:
     rows, columns = np.ogrid[: shape[0], : shape[1]]
     return np.asarray((rows + columns) % period < wide)
 
-
-def _lay(world: Image, where: Bools, color: tuple[int, int, int], alpha: int) -> None:
-    """Blend one colour over the pixels of a mask."""
-    blend(world, color, np.where(where, alpha, 0).astype(np.uint8), 0, 0)
-
-
-WAY_WIDTH, WAY_DASH, HEAD = 1.4, 6.0, 11.0  # width, dashes and head of the arrow of what has moved, px
-FAR = 6.0  # length of the shortest arrow that is drawn, px of the picture
-
-
-def draw_present(world: World, report: Mapping[str, Any]) -> Bools:
-    """Draw the present outlines of moved objects, and arrows from their old places; return the arrows' mask (h, w)."""
-    strokes = Strokes(world.image.shape[:2])
-    for entry in report["now"]["moved"]:
-        runs = np.array(entry["runs"], np.int64).reshape(-1, 3)
-        world.border(*Spans(*runs.T).to_mask(), "now")
-        begin, end = world.placed(np.array([entry["from_xy"], entry["to_xy"]]))
-        way = end - begin
-        length = float(np.sqrt((way**2).sum()))
-        if length > FAR:
-            strokes.line(begin, end, WAY_WIDTH, WAY_DASH)
-            strokes.head(end, way / length, min(HEAD, length))
-    strokes.lay(world.image, *OUTLINES["now"], grounded=True)
-    return np.asarray(strokes.ground > 0)
-
-
-Color = tuple[int, int, int]
 
 EDGE, TOP = 16, 44  # left edge of the picture on the page, and its top, px
 LINE, COLUMN, NARROWEST, GAP = 19, 464, 1000, 12  # line height, least widths of a card and a page, gap of cards, px
@@ -407,7 +393,7 @@ def legend_of(report: Mapping[str, Any], painted: Set[str], width: int) -> Legen
     words = {"hit": "object hit", "blocked": "object blocked", "other": target, "now": "where it is now"}
     words["shadow"] = "edge of a shadow"
     entries += [Entry(word, _outlined(kind)) for kind, word in words.items() if f"object {kind}" in painted]
-    entries += [Entry(name, _sketched(color, name)) for name, color in SKETCH.items() if name in painted]
+    entries += [Entry(name, sketch_mark(name)) for name in SKETCH if name in painted]
     entries += sign_entries(painted)
     if "occluder" in painted:
         entries.append(Entry("occluder", mark_of(_stripes((14, 14), 6, 2), HATCH)))
@@ -419,32 +405,11 @@ def sign_entries(painted: Set[str]) -> list[Entry]:
     return [Entry(name, sign_mark(name)) for name in NAMED_SIGNS if f"ray: {name}" in painted]
 
 
-def mark_of(where: Bools, color: Color, ground: Color = MARK_GROUND) -> Image:
-    """Mark (h, w, 3) of a legend, in one colour on a ground."""
-    return np.where(where[:, :, None], np.array(color, np.uint8), np.array(ground, np.uint8))
-
-
-def verdict_mark(verdict: str, size: int = 14) -> Image:
-    """Mark (size, size, 3) of a verdict, for a legend."""
-    return mark_of(glyph(verdict, size), MARKS[verdict][0])
-
-
 def _outlined(kind: str) -> Image:
     thick = 1 if kind in THIN else 2
     border = _stripes((14, 14), 6, 3 if kind in DASHED else 6)
     border[thick:-thick, thick:-thick] = False
     return mark_of(border, OUTLINES[kind][0])
-
-
-def _sketched(color: Color, name: str) -> Image:
-    """Mark of a volume, a rhombus unlike the outline of an object; or of a cell, filled if it was opened."""
-    columns = np.abs(2 * np.arange(14) - 13)
-    rows = columns[:, None]
-    if name.startswith("cell"):
-        ground = (np.array(color) + 2 * np.array(MARK_GROUND)) // 3 if name == "cell opened" else MARK_GROUND
-        return mark_of(np.maximum(rows, columns) == 13, color, ground)
-    away = rows + columns
-    return mark_of((away <= 13) & (away > (7 if name == LET_THROUGH else 9)), color)
 
 
 def _summary(report: Mapping[str, Any], width: int) -> Text:

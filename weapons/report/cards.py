@@ -5,21 +5,20 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from hitplanes.planes.common.checks import Image
 from hitplanes.planes.common.limits import WEIGHT_FULL
 from hitplanes.planes.files.png import cv2
-from hitplanes.planes.grid.spans import Box
 from hitplanes.planes.scene.scene import Scene
 
 from . import phrases
-from .canvas import CARD, FAINT, INK, LINE, Text, World, clipped, verdict_mark
+from .canvas import CARD, FAINT, INK, LETTER, LINE, Text, World, clipped
 from .overlay import draw_arrows
 from .phrases import NAME_MAX, fragile, percent, reason, short
-from .symbols import MARKS, tiled_glyph
+from .symbols import MARKS, tiled_glyph, verdict_mark
 
 CELL, COLUMNS, ROWS = 14, 15, 9
 """Side of a pixel of the world in the inset, px, and how many are shown; odd, so that the hit lies in the middle."""
@@ -28,22 +27,14 @@ LIGHT = 200  # brightness of the scene in the inset, of 255; brighter than in th
 GRID = 130  # brightness of the lines of the grid, relative to the inset, of 255
 
 
-class Inset(NamedTuple):
-    """Enlarged pixels (h, w, 3), and the box of the world that they show."""
-
-    image: Image
-    view: Box
-
-
-def inset_of(shot: Mapping[str, Any], scene: Scene) -> Inset | None:
+def inset_of(shot: Mapping[str, Any], scene: Scene) -> World | None:
     """Draw the pixels around the first hit of a shot; None if it hit nothing."""
     if not shot["rows"]:
         return None
     x, y = shot["rows"][0]["first_xy"]
     view = (x - COLUMNS // 2, y - ROWS // 2, x + COLUMNS // 2, y + ROWS // 2)
     world = World(scene, scene.bounds, view, CELL, LIGHT)
-    for verdict in MARKS:
-        world.mark_samples([shot], verdict)
+    world.mark_samples([shot])
     for item in sorted({row["object"] for row in shot["rows"]}):
         world.outline(item, "hit")
     image = world.image
@@ -54,14 +45,13 @@ def inset_of(shot: Mapping[str, Any], scene: Scene) -> Inset | None:
     left, top = COLUMNS // 2 * CELL, ROWS // 2 * CELL
     frame = image[top : top + CELL + 1, left : left + CELL + 1]
     frame[[0, -1]] = frame[:, [0, -1]] = (255, 255, 255)
-    return Inset(image, view)
+    return world
 
 
 HIT_LINES = 24  # most rows of hits on a card; the JSON has all
 NOT_LINES = 5  # most objects that a card names as blocked or as not hit; the JSON has all
 CELL_WIDTH, NARROW, MANY = 64, 58, 7  # width of a column of numbers, px; and where there are many
 BAR = 9  # height of the bar of verdicts, px
-LETTER = 8  # about the width of a digit, px
 
 HEADER = ("object hit", "pixels", "pattern", "visible", "mask", "nearest")
 WEIGHT_HEADER = ("object hit", "pixels", "weight", *HEADER[2:])  # with falloff; in samples of full weight
@@ -77,7 +67,7 @@ class Card:
     title: str  # at the left of the first line
     fired: str  # at the right of the first line
     verdicts: Mapping[str, int]  # number of samples by verdict
-    inset: Inset | None  # around the first hit
+    inset: World | None  # around the first hit
     lines: Sequence[Sequence[str]]  # one cell is a sentence, two are an object and a reason, more are a row of a table
     ray: Mapping[str, Any] | None = None  # the only ray of a shot, drawn above the verdicts; None draws a bar of them
 
@@ -288,7 +278,7 @@ def _counts(page: Image, verdicts: Mapping[str, int], x: int, y: int, wide: int)
     return texts
 
 
-def _inset(page: Image, inset: Inset, x: int, y: int) -> list[Text]:
+def _inset(page: Image, inset: World, x: int, y: int) -> list[Text]:
     """Draw an inset, and the coordinates of its first, middle and last rows and columns."""
     left = x + _margin(inset)
     page[y : y + ROWS * CELL, left : left + COLUMNS * CELL] = inset.image
@@ -304,6 +294,6 @@ def _inset(page: Image, inset: Inset, x: int, y: int) -> list[Text]:
     return texts
 
 
-def _margin(inset: Inset) -> int:
+def _margin(inset: World) -> int:
     """Width of the margin for the coordinates of rows, px."""
     return 8 + LETTER * max(len(str(inset.view[1])), len(str(inset.view[3])))

@@ -17,9 +17,9 @@ from hitplanes.planes.grid.spans import Box, Spans
 from hitplanes.planes.scene.objects import Role
 from hitplanes.planes.scene.scene import Scene
 
-from .canvas import DARK, INK, OUTLINES_MAX, Text, World, covered, enlarged
+from .canvas import DARK, INK, OUTLINES, OUTLINES_MAX, Text, World, covered, enlarged
 from .phrases import NAME_MAX, apart, short
-from .symbols import BADGE, MARKS, MINT, NEAR_MISS, Signs
+from .symbols import BADGE, MARKS, MINT, NEAR_MISS, Signs, Strokes
 
 LETTER, ROW = 7, 17  # width of a letter and height of a label, px; not the font's, which depend on OpenCV's version
 LABELS_MAX = 16  # most names in one picture; the cards have all
@@ -180,6 +180,25 @@ def _around(box: Box, half_w: int, half_h: int, farthest: int) -> Iterator[tuple
         yield from ((right, up), (left, up), (right, down), (left, down))
 
 
+WAY_WIDTH, WAY_DASH, HEAD = 1.4, 6.0, 11.0  # width, dashes and head of the arrow of what has moved, px
+SHORTEST = 6.0  # length of the shortest arrow that is drawn, px of the picture
+
+
+def draw_present(world: World, report: Mapping[str, Any]) -> Bools:
+    """Draw the present outlines of moved objects, and arrows from their old places; return the arrows' mask (h, w)."""
+    strokes = Strokes(world.image.shape[:2])
+    for entry in report["now"]["moved"]:
+        world.outline_runs(entry["runs"], "now")
+        begin, end = world.placed(np.array([entry["from_xy"], entry["to_xy"]]))
+        way = end - begin
+        length = float(np.sqrt((way**2).sum()))
+        if length > SHORTEST:
+            strokes.line(begin, end, WAY_WIDTH, WAY_DASH)
+            strokes.head(end, way / length, min(HEAD, length))
+    strokes.lay(world.image, *OUTLINES["now"], grounded=True)
+    return np.asarray(strokes.ground > 0)
+
+
 NUMBERED_MAX = 3  # most rays of a shot whose entries have numbers and normals
 STEPS_SHOWN = 256  # most tests of a projectile that are drawn, each as a disc
 OF_RAYS = ("filtered", "occluded", "hit")  # whose cells are marked under rays; the arrow shows the empty ones
@@ -188,11 +207,6 @@ BADGE_INK = (18, 20, 24)
 
 CLEAR_OF = ("number", "first contact", "goes in", "comes out", "ends: occluder", "ends: budget", "ray")
 """Symbols that a number may not cover."""
-
-
-def marked(shots: Sequence[Mapping[str, Any]], verdict: str) -> list[Mapping[str, Any]]:
-    """Shots whose samples of one verdict are marked; for rays only those of OF_RAYS are."""
-    return [shot for shot in shots if "rays" not in shot or verdict in OF_RAYS]
 
 
 def draw_rays(world: World, report: Mapping[str, Any]) -> tuple[list[Text], Bools]:

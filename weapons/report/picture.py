@@ -30,20 +30,18 @@ from .canvas import (
     World,
     clipped,
     covered,
-    draw_present,
     draw_texts,
     factor_of,
     fill,
     heat_boxes,
     page_of,
     sign_entries,
-    verdict_mark,
 )
 from .cards import batch_cards, hit_now, shot_card
 from .differences import differences
-from .overlay import Overlay, draw_rays, marked
+from .overlay import OF_RAYS, Overlay, draw_present, draw_rays
 from .report import FORMAT
-from .symbols import MARKS
+from .symbols import MARKS, verdict_mark
 
 
 def picture_of_report(report: Mapping[str, Any], scene: Scene, *, text: bool = True) -> Image:
@@ -103,9 +101,9 @@ def _shots(world: World, report: Mapping[str, Any], scene: Scene) -> list[Text]:
     hit = {row["object"] for shot in shots for row in shot["rows"]}
     blocked = {entry["object"] for shot in shots for by in shot["blockers"] for entry in by["blocked"]} - hit
     world.outline_seen([item for item in scene.ids(Role.HITTABLE).tolist() if item not in hit | blocked])
-    for verdict in MARKS:
-        world.mark_samples(marked(shots, verdict), verdict)
-    world.outline_shadows(shots)
+    world.mark_samples(shots, OF_RAYS)
+    for shot in shots:  # the edges of what lies sheltered, as people draw light
+        world.outline_runs(shot.get("sheltered", ()), "shadow")
     for kind, items in (("blocked", blocked), ("hit", hit)):
         for item in sorted(items):
             world.outline(item, kind)
@@ -215,10 +213,9 @@ def _around(a: Box, b: Box) -> Box:
 
 def _marked(world: World, report: Mapping[str, Any]) -> list[Text]:
     """Mark the samples of one report, and number its shots."""
-    for verdict in MARKS:
-        world.mark_samples(marked(report["shots"], verdict), verdict)
-        if report["batch"]:
-            world.mark_heat(report["batch"], verdict)
+    world.mark_samples(report["shots"], OF_RAYS)
+    for verdict in MARKS if report["batch"] else ():
+        world.mark_heat(report["batch"], verdict)
     there = set() if world.scene is None else set(world.scene.ids().tolist())
     for item in sorted(there & {row["object"] for shot in report["shots"] for row in shot["rows"]}):
         world.outline(item, "hit")

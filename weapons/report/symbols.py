@@ -11,7 +11,9 @@ import numpy as np
 from hitplanes.planes.common.checks import Bools, Floats, Image, Ints
 from hitplanes.planes.grid.spans import slabs
 
-MARKS: dict[str, tuple[tuple[int, int, int], int]] = {
+Color = tuple[int, int, int]
+
+MARKS: dict[str, tuple[Color, int]] = {
     "beyond": ((178, 184, 196), 190),
     "empty": ((255, 255, 255), 190),
     "outside": ((240, 228, 66), 220),
@@ -70,11 +72,31 @@ def glyph(verdict: str, size: int) -> Bools:
     return np.asarray(shapes[verdict] & (x <= last) & (y <= last), np.bool_)
 
 
+def mark_of(where: Bools, color: Color, ground: Color = MARK_GROUND) -> Image:
+    """Mark (h, w, 3) of a legend, in one colour on a ground."""
+    return np.where(where[:, :, None], np.array(color, np.uint8), np.array(ground, np.uint8))
+
+
+def verdict_mark(verdict: str, size: int = 14) -> Image:
+    """Mark (size, size, 3) of a verdict, for a legend."""
+    return mark_of(glyph(verdict, size), MARKS[verdict][0])
+
+
+def sketch_mark(name: str) -> Image:
+    """Mark of a volume, a rhombus unlike the outline of an object; or of a cell, filled if it was opened."""
+    color = SKETCH[name]
+    columns = np.abs(2 * np.arange(14) - 13)
+    rows = columns[:, None]
+    if name.startswith("cell"):
+        ground = (np.array(color) + 2 * np.array(MARK_GROUND)) // 3 if name == "cell opened" else MARK_GROUND
+        return mark_of(np.maximum(rows, columns) == 13, color, ground)
+    away = rows + columns
+    return mark_of((away <= 13) & (away > (7 if name == LET_THROUGH else 9)), color)
+
+
 CASING = 1.5  # width of the dark border of a stroke, px; it makes light lines visible on light ground
 
 DARK, DARK_ALPHA = (14, 16, 20), 190
-
-BRUSH = 24.0  # reach of a stroke, px, above which all pixels of its box are tested, not only those along its line
 
 
 class Strokes:
@@ -107,11 +129,11 @@ class Strokes:
         edge = (back * slant - beside) / np.sqrt(1 + slant * slant)
         self._put(x, y, np.minimum(edge, length - back))
 
-    def lay(self, image: Image, color: tuple[int, int, int], alpha: int, grounded: bool) -> None:
+    def lay(self, image: Image, color: Color, alpha: int, grounded: bool) -> None:
         """Blend the strokes over a picture (h, w, 3), on their ground or bare."""
         if grounded:
-            _blend(image, DARK, self.ground.astype(np.int64) * DARK_ALPHA * alpha // (255 * 255))
-        _blend(image, color, self.ink.astype(np.int64) * alpha // 255)
+            paint(image, DARK, self.ground.astype(np.int64) * DARK_ALPHA * alpha // (255 * 255))
+        paint(image, color, self.ink.astype(np.int64) * alpha // 255)
 
     def _put(self, x: Floats, y: Floats, inside: Floats) -> None:
         """Ink pixels by how far their middles lie inside a stroke, px; each pixel is given once."""
@@ -148,9 +170,6 @@ def _pixels(a: Floats, b: Floats, reach: float, shape: tuple[int, int]) -> tuple
     high = np.ceil(np.minimum(np.maximum(a, b) + reach, shape[::-1]))
     if (low >= high).any():
         return np.zeros(0), np.zeros(0)
-    if reach > BRUSH:
-        y, x = np.mgrid[low[1] : high[1], low[0] : high[0]].reshape(2, -1) + 0.5
-        return x, y
     step = b - a
     main = int(abs(step[1]) > abs(step[0]))
     at = np.arange(low[main], high[main]) + 0.5
@@ -171,12 +190,12 @@ def within(begin: Floats, end: Floats, size: Floats | Ints, over: float) -> tupl
     return (begin + first[:, None] * step)[kept], (begin + last[:, None] * step)[kept]
 
 
-def _blend(image: Image, color: tuple[int, int, int], alpha: Ints) -> None:
-    """Blend a colour over the pixels of an opacity (h, w) that is not 0; rounded to the nearest."""
+def paint(image: Image, color: Color | Image, alpha: Ints) -> None:
+    """Blend one colour, or colours (h, w, 3), over the pixels of an opacity (h, w) that is not 0, to the nearest."""
     row, column = np.nonzero(alpha)
     a = alpha[row, column][:, None]
-    under = image[row, column].astype(np.int64)
-    image[row, column] = (under * (255 - a) + np.array(color) * a + 127) // 255
+    over, under = (np.broadcast_to(colors, image.shape)[row, column].astype(np.int64) for colors in (color, image))
+    image[row, column] = (under * (255 - a) + over * a + 127) // 255
 
 
 WHITE, ORANGE, BLUE = (255, 255, 255), MARKS["hit"][0], MARKS["occluded"][0]
@@ -184,7 +203,7 @@ MINT, YELLOW = (120, 240, 190), (255, 236, 130)
 
 THROUGH = "in and out of an object"
 
-SIGNS: dict[str, tuple[tuple[int, int, int], int, bool]] = {
+SIGNS: dict[str, tuple[Color, int, bool]] = {
     "swept": (WHITE, 34, False),
     "what it sweeps": (WHITE, 150, False),
     "tested only here": (WHITE, 220, True),
