@@ -32,8 +32,7 @@ from hitplanes import (
     weapons_of,
 )
 from hitplanes.weapons.replay.shot_log import fire_request, requests_of
-from hitplanes.weapons.report.differences import decisive, differences
-from hitplanes.weapons.report.phrases import same
+from hitplanes.weapons.report.differences import decisive, differences, same
 from hitplanes.weapons.report.report import report_of
 
 GALLERY = Path(__file__).parents[1] / "fixtures" / "gallery"

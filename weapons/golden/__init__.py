@@ -168,15 +168,17 @@ class Run:
         updated, stale = ([self._shown(base) for base in sorted(bases)] for bases in (self._updated, self._stale))
         if not (updated or stale or self._page):
             return
+        from ..report.phrases import counted
+
         terminalreporter.section("hits_golden")
         for bases, what in ((updated, "updated"), (stale, "that no test uses (--hits-stale)")):
             if bases:
-                terminalreporter.line(f"{_counted(len(bases))} {what}:")
+                terminalreporter.line(f"{counted(len(bases), 'golden')} {what}:")
             for base in bases:
                 terminalreporter.line(f"  {base}.json")
         if self._page is not None:
             failed = sum(record["outcome"] == "failed" for record in self._outcomes.values())
-            terminalreporter.line(f"{_counted(failed)} failed: {self._shown(self._page)}")
+            terminalreporter.line(f"{counted(failed, 'golden')} failed: {self._shown(self._page)}")
 
     def _write_page(self) -> None:
         """Replace the page of an earlier run by that of this run's failures; without failures, delete it."""
@@ -194,7 +196,3 @@ class Run:
         from .check import relative
 
         return printable(relative(path, self._config.invocation_params.dir))
-
-
-def _counted(n: int) -> str:
-    return f"{n} golden" + ("" if n == 1 else "s")

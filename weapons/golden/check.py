@@ -26,6 +26,7 @@ from hitplanes.planes.scene.render import plane_objects
 from hitplanes.planes.scene.scene import Scene
 
 from ..report.canvas import enlarged
+from ..report.phrases import counted
 from ..report.picture import picture_of_difference, picture_of_report
 from .file import (
     EXACT,
@@ -265,7 +266,7 @@ def _delete(folder: Path, names: Iterable[str]) -> None:
 
 def _page(failures: Sequence[dict[str, Any]]) -> str:
     """Return the HTML of the page, which refers to local files only."""
-    count = f"{len(failures)} golden" + ("" if len(failures) == 1 else "s") + " failed"
+    count = f"{counted(len(failures), 'golden')} failed"
     parts = [f"<h1>{count}</h1>"]
     if len(failures) > 1:
         links = (f'<li><a href="#{i}">{_escaped(f["test"])}</a></li>' for i, f in enumerate(failures))

@@ -29,8 +29,7 @@ from hitplanes.planes.files.scene_folder import laid_out
 from hitplanes.planes.scene.scene import Scene
 
 from ..fire.hits import Hits
-from ..report.differences import BATCH_COLUMNS, decisive, differences
-from ..report.phrases import Entry
+from ..report.differences import BATCH_COLUMNS, Entry, decisive, differences
 from ..report.picture import picture_of_report
 from ..report.report import report_of
 

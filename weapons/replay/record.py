@@ -59,8 +59,8 @@ from ..rays.ray_hits import RayHits
 
 if TYPE_CHECKING:
     from ..fire.call import Fired, Places
-from ..report.phrases import Entry, by_path, first_of, key_of, pairs
-from ..report.phrases import shown as number_of
+from ..report.differences import Entry, by_path, first_of, key_of, pairs
+from ..report.differences import shown as number_of
 
 FORMAT = "hitplanes-shots/3"
 WITHOUT_CHAIN = "hitplanes-shots/1"  # oldest format, without chain and end

@@ -17,6 +17,7 @@ from hitplanes.planes.scene.objects import Role
 from hitplanes.planes.scene.render import GROUND, draw_view
 from hitplanes.planes.scene.scene import Scene
 
+from .phrases import counted
 from .symbols import (
     HEAT,
     MARKS,
@@ -416,7 +417,7 @@ def _summary(report: Mapping[str, Any], width: int) -> Text:
     shots, batch = report["shots"], report["batch"]
     objects = {entry["object"] for shot in shots for entry in shot["rows"]}
     objects |= {entry["object"] for entry in (batch["objects"] if batch else ())}
-    text = f"{_counted(batch['shots'] if batch else len(shots), 'shot')}, {_counted(len(objects), 'object')} hit"
+    text = f"{counted(batch['shots'] if batch else len(shots), 'shot')}, {counted(len(objects), 'object')} hit"
     if report.get("now", {}).get("tick") is not None:
         text = f"tick {report['now']['tick']:g}: {text}"
     return Text(width - EDGE, 28, text, FAINT, right=True)
@@ -432,7 +433,3 @@ def _footer(report: Mapping[str, Any], width: int, height: int) -> list[Text]:
     source = f"scene {scene['hash']}, version {scene['version']}, hitplanes {report['version']}"
     plan = "; ".join(f"{word}: {', '.join(stages)}" for word, stages in (("ran", ran), ("left out", left)) if stages)
     return [Text(EDGE, height - 30, source, FAINT), Text(EDGE, height - 12, clipped(plan, width - 2 * EDGE), FAINT)]
-
-
-def _counted(n: int, what: str) -> str:
-    return f"{n} {what}" + ("" if n == 1 else "s")

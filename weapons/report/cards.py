@@ -16,8 +16,9 @@ from hitplanes.planes.scene.scene import Scene
 
 from . import phrases
 from .canvas import CARD, FAINT, INK, LETTER, LINE, Text, World, clipped
+from .differences import reason
 from .overlay import draw_arrows
-from .phrases import NAME_MAX, fragile, percent, reason, short
+from .phrases import NAME_MAX, fragile, percent, short
 from .symbols import MARKS, tiled_glyph, verdict_mark
 
 CELL, COLUMNS, ROWS = 14, 15, 9

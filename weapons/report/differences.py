@@ -1,4 +1,4 @@
-"""Differences between two reports, as lines in the game's words.
+"""Differences between two JSON values, and those between two reports as lines in the game's words.
 
 Each part that differs gets a line in words or, if there are no words for it, a line with its path; so no difference
 that matters is left out.
@@ -8,31 +8,116 @@ from __future__ import annotations
 
 import difflib
 import itertools
+import json
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 from hitplanes.planes.common.checks import printable
 
-from .phrases import (
-    ABSENT,
-    LINES_MAX,
-    Entry,
-    Pair,
-    by_path,
-    entries,
-    first_of,
-    key_of,
-    pairs,
-    reason,
-    same,
-    shown,
-    text_of_json,
-    unquoted,
-)
+from .phrases import short
+
+LINES_MAX = 12  # most lines of one list; the others are counted
+VALUE_LETTERS = 80  # most letters of a value that a line shows
+ABSENT = object()  # stands for a key that an object does not have
+
+Entry = Mapping[str, Any]
 
 
-def ray_changes(was: Entry, now: Entry) -> list[str] | None:
-    """Lines about the changed rays of a shot, from any JSON; None if there are no words for the change."""
+def same(a: Any, b: Any) -> bool:
+    """Whether two values are equal as JSON: 1 differs from true, a tuple equals a list."""
+    if isinstance(a, dict) and isinstance(b, dict):
+        return a.keys() == b.keys() and all(same(value, b[key]) for key, value in a.items())
+    if isinstance(a, list | tuple) and isinstance(b, list | tuple):
+        return len(a) == len(b) and all(map(same, a, b))
+    return isinstance(a, bool) == isinstance(b, bool) and bool(a == b)
+
+
+def by_path(path: str, was: Any, now: Any) -> Iterator[str]:
+    """Lines about the leaves that differ, each with its path."""
+    if same(was, now):
+        return
+    if isinstance(was, dict) and isinstance(now, dict):
+        for key in dict.fromkeys([*was, *now]):
+            yield from by_path(f"{path}.{key}" if path else str(key), was.get(key, ABSENT), now.get(key, ABSENT))
+    elif isinstance(was, list | tuple) and isinstance(now, list | tuple) and len(was) == len(now):
+        for i, pair in enumerate(zip(was, now, strict=True)):
+            yield from by_path(f"{path}[{i}]", *pair)
+    elif isinstance(was, list | tuple) and isinstance(now, list | tuple):
+        yield f"{path}: {len(now)} entries, was {len(was)}"
+    else:
+        yield f"{path}: {shown(now)}, was {shown(was)}"
+
+
+Pair = tuple[Entry, Entry | None, Entry | None]
+"""The present entry, or the earlier one if it is gone, to name both by; then the earlier and the present one."""
+
+
+def pairs(was: Any, now: Any, *names: str) -> Iterator[Pair]:
+    """Pair the entries of two lists that agree in the named fields, in the order of the first list, then the second."""
+    before, after = ({key_of(entry, *names): entry for entry in entries(side)} for side in (was, now))
+    for key, entry in (before | after).items():
+        yield entry, before.get(key), after.get(key)
+
+
+def entries(value: Any) -> list[Entry]:
+    """Objects of a list; empty for any other value."""
+    return [entry for entry in value if isinstance(entry, dict)] if isinstance(value, list | tuple) else []
+
+
+def key_of(entry: Entry, *names: str) -> str:
+    """Named fields of an entry as one text."""
+    return text_of_json([entry.get(name) for name in names])
+
+
+def text_of_json(value: Any) -> str:
+    """Value as JSON with sorted keys, or as Python shows it if it is not JSON."""
+    return json.dumps(value, sort_keys=True, default=repr)
+
+
+def first_of(lines: Iterable[str]) -> list[str]:
+    """First LINES_MAX lines, and the number of the others."""
+    every = list(lines)
+    more = len(every) - LINES_MAX
+    return every if more <= 0 else [*every[:LINES_MAX], f"and {more} more"]
+
+
+def shown(value: Any) -> str:
+    """Value as a short text without line breaks."""
+    if value is None or value is ABSENT:
+        return "missing" if value is ABSENT else "none"
+    text = json.dumps(value, ensure_ascii=False, default=repr)
+    if isinstance(value, float):
+        text = text.removesuffix(".0")
+    return text if len(text) <= VALUE_LETTERS else text[: VALUE_LETTERS - 3] + "..."
+
+
+REASONS = {
+    "category": "not an accepted category",
+    "excluded": "its owner is excluded",
+    "outside": "out of bounds",
+    "inside": "it started inside of it",
+    "tunnelled": "went through it between two tests",
+    "budget": "no budget to begin with",
+}
+
+
+def reason(entry: Mapping[str, Any], name_max: int | None = None) -> str:
+    """Why an object was not hit, from any JSON; names are cut to `name_max` letters."""
+    why = entry.get("reason")
+    if why == "missed":
+        return f"missed by {_px(entry.get('distance'))}"
+    if why == "behind":
+        names = [unquoted(by.get("name")) for by in entries(entry.get("by"))]
+        return "behind " + ", ".join(name if name_max is None else short(name, name_max) for name in names)
+    return REASONS.get(str(why), shown(why))
+
+
+def unquoted(value: Any) -> str:
+    """Name on one line, without quotes."""
+    return shown(value)[1:-1] if isinstance(value, str) else shown(value)
+
+
+def _rays(was: Entry, now: Entry) -> list[str] | None:
     known = [*entries(was["rays"]), *entries(now["rays"])]
     lines = []
     for ray, before, after in pairs(was["rays"], now["rays"], "round", "pellet"):
@@ -40,7 +125,7 @@ def ray_changes(was: Entry, now: Entry) -> list[str] | None:
         if before is None or after is None:
             lines.append(f"{name} is {'new' if before is None else 'missing'}")
         else:
-            lines += [f"{name}: {line}" for line in _changes(before, after)]
+            lines += [f"{name}: {line}" for line in _lines_of(before, after, {"stop": _stop, "passes": _passes})]
     return first_of(lines) or None
 
 
@@ -51,22 +136,11 @@ def _ray_name(ray: Entry, known: list[Entry]) -> str:
     return f"{name} of round {shown(ray.get('round'))}" if rounds else name
 
 
-def _changes(was: Entry, now: Entry) -> list[str]:
-    lines = []
-    for key in dict.fromkeys(["stop", "passes", *was, *now]):
-        before, after = was.get(key, ABSENT), now.get(key, ABSENT)
-        if not same(before, after):
-            words = {"stop": _stop, "passes": _passes}.get(key)
-            lines += (words(before, after) if words else None) or first_of(by_path(key, before, after))
-    return lines
-
-
-def _stop(was: Any, now: Any) -> list[str] | None:
+def _stop(was: Entry, now: Entry) -> list[str] | None:
     """Line about where and why a ray stopped; None if it would read the same."""
-    if not (isinstance(was, dict) and isinstance(now, dict)):
-        return None
     (place, far, why), (old_place, old_far, old_why) = (
-        (_ray_at(stop.get("item")), _px(stop.get("distance")), unquoted(stop.get("reason"))) for stop in (now, was)
+        (_ray_at(stop.get("item")), _px(stop.get("distance")), unquoted(stop.get("reason")))
+        for stop in (now["stop"], was["stop"])
     )
     if (place, far, why) == (old_place, old_far, old_why):
         return None
@@ -76,9 +150,9 @@ def _stop(was: Any, now: Any) -> list[str] | None:
     return [f"stopped {place + ', ' if place else 'after '}{far} ({why}), was {', '.join(before)}{reason}"]
 
 
-def _passes(was: Any, now: Any) -> list[str] | None:
+def _passes(was: Entry, now: Entry) -> list[str] | None:
     lines = []
-    for entry, before, after in pairs(was, now, "object"):
+    for entry, before, after in pairs(was["passes"], now["passes"], "object"):
         name = _name(entry)
         if before is None or after is None:
             lines.append(f"{'newly' if before is None else 'no longer'} goes through {name}{_way(entry)}")
@@ -166,7 +240,7 @@ def _lines_of(was: Entry, now: Entry, words: Mapping[str, Words]) -> list[str]:
     return lines
 
 
-OBJECTS = ("scene", "weapons", "batch", "verdicts", "samples")  # keys whose words are only for objects
+OBJECTS = ("scene", "weapons", "batch", "verdicts", "samples", "stop")  # keys whose words are only for objects
 
 
 def _scene(was: Entry, now: Entry) -> list[str] | None:
@@ -201,7 +275,7 @@ def _shots(was: Entry, now: Entry) -> list[str] | None:
 def _shot(was: Entry, now: Entry) -> list[str]:
     words: dict[str, Words] = {
         "at": lambda was, now: [f"fired at {_place(now['at'])}, was {_place(was['at'])}"],
-        "rows": _rows, "blockers": _blockers, "why_not": _why_not, "verdicts": _verdicts, "rays": ray_changes,
+        "rows": _rows, "blockers": _blockers, "why_not": _why_not, "verdicts": _verdicts, "rays": _rays,
         "samples": _samples,
     }  # fmt: skip
     return _lines_of(_chief(was), _chief(now), words) or _lines_of(was, now, words)

@@ -1,114 +1,16 @@
-"""Phrases for the content of a report, and for the differences between two JSON values."""
+"""Phrases for the content of a report: the cells and lines of its cards."""
 
 from __future__ import annotations
 
-import json
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from hitplanes.planes.common.limits import FRAGILE_PX, SUB, WEIGHT_FULL
 
-LINES_MAX = 12  # most lines of one list; the others are counted
-VALUE_LETTERS = 80  # most letters of a value that a line shows
-ABSENT = object()  # stands for a key that an object does not have
-
-Entry = Mapping[str, Any]
-
-
-def same(a: Any, b: Any) -> bool:
-    """Whether two values are equal as JSON: 1 differs from true, a tuple equals a list."""
-    if isinstance(a, dict) and isinstance(b, dict):
-        return a.keys() == b.keys() and all(same(value, b[key]) for key, value in a.items())
-    if isinstance(a, list | tuple) and isinstance(b, list | tuple):
-        return len(a) == len(b) and all(map(same, a, b))
-    return isinstance(a, bool) == isinstance(b, bool) and bool(a == b)
-
-
-def by_path(path: str, was: Any, now: Any) -> Iterator[str]:
-    """Lines about the leaves that differ, each with its path."""
-    if same(was, now):
-        return
-    if isinstance(was, dict) and isinstance(now, dict):
-        for key in dict.fromkeys([*was, *now]):
-            yield from by_path(f"{path}.{key}" if path else str(key), was.get(key, ABSENT), now.get(key, ABSENT))
-    elif isinstance(was, list | tuple) and isinstance(now, list | tuple) and len(was) == len(now):
-        for i, pair in enumerate(zip(was, now, strict=True)):
-            yield from by_path(f"{path}[{i}]", *pair)
-    elif isinstance(was, list | tuple) and isinstance(now, list | tuple):
-        yield f"{path}: {len(now)} entries, was {len(was)}"
-    else:
-        yield f"{path}: {shown(now)}, was {shown(was)}"
-
-
-Pair = tuple[Entry, Entry | None, Entry | None]
-"""The present entry, or the earlier one if it is gone, to name both by; then the earlier and the present one."""
-
-
-def pairs(was: Any, now: Any, *names: str) -> Iterator[Pair]:
-    """Pair the entries of two lists that agree in the named fields, in the order of the first list, then the second."""
-    before, after = ({key_of(entry, *names): entry for entry in entries(side)} for side in (was, now))
-    for key in before | after:
-        yield (before | after)[key], before.get(key), after.get(key)
-
-
-def entries(value: Any) -> list[Entry]:
-    """Objects of a list; empty for any other value."""
-    return [entry for entry in value if isinstance(entry, dict)] if isinstance(value, list | tuple) else []
-
-
-def key_of(entry: Entry, *names: str) -> str:
-    """Named fields of an entry as one text."""
-    return text_of_json([entry.get(name) for name in names])
-
-
-def text_of_json(value: Any) -> str:
-    """Value as JSON with sorted keys, or as Python shows it if it is not JSON."""
-    return json.dumps(value, sort_keys=True, default=repr)
-
-
-def first_of(lines: Iterable[str]) -> list[str]:
-    """First LINES_MAX lines, and the number of the others."""
-    every = list(lines)
-    more = len(every) - LINES_MAX
-    return every if more <= 0 else [*every[:LINES_MAX], f"and {more} more"]
-
-
-def shown(value: Any) -> str:
-    """Value as a short text without line breaks."""
-    if value is None or value is ABSENT:
-        return "missing" if value is ABSENT else "none"
-    text = json.dumps(value, ensure_ascii=False, default=repr)
-    if isinstance(value, float):
-        text = text.removesuffix(".0")
-    return text if len(text) <= VALUE_LETTERS else text[: VALUE_LETTERS - 3] + "..."
-
-
-REASONS = {
-    "category": "not an accepted category",
-    "excluded": "its owner is excluded",
-    "outside": "out of bounds",
-    "inside": "it started inside of it",
-    "tunnelled": "went through it between two tests",
-    "budget": "no budget to begin with",
-}
-
 SLANT = 1 + 2**0.5  # tangent of 67.5 degrees: a direction within 22.5 degrees of an axis has one word, any other two
 LEAST_TOLD = 0.05  # least distance that is not rounded to 0.0, px
 NAME_MAX = 24  # most letters of a name on a label
-
-
-def reason(entry: Mapping[str, Any], name_max: int | None = None) -> str:
-    """Why an object was not hit, from any JSON; names are cut to `name_max` letters."""
-    why = entry.get("reason")
-    if why == "missed":
-        distance = entry.get("distance")
-        plain = isinstance(distance, int | float) and not isinstance(distance, bool)
-        return f"missed by {distance:.1f} px" if plain else f"missed by {shown(distance)}"
-    if why == "behind":
-        names = [unquoted(by.get("name")) for by in entries(entry.get("by"))]
-        return "behind " + ", ".join(name if name_max is None else short(name, name_max) for name in names)
-    return REASONS.get(str(why), shown(why))
 
 
 def apart(distance: float) -> str:
@@ -142,11 +44,6 @@ def short(name: str, most: int = NAME_MAX) -> str:
 def percent(share: float) -> str:
     """Share as a percentage."""
     return f"{100 * share:.1f} %" if share == 0 or share >= 0.001 else "< 0.1 %"
-
-
-def unquoted(value: Any) -> str:
-    """Name on one line, without quotes."""
-    return shown(value)[1:-1] if isinstance(value, str) else shown(value)
 
 
 RAY_HEADER = ("object hit", "in", "out", "material")
@@ -184,7 +81,7 @@ def ended(rays: Sequence[Mapping[str, Any]]) -> list[str]:
         stop = rays[0]["stop"]
         return [f"ended{_at(stop)}{',' if stop['item'] else ' after'} {stop['distance']:.1f} px: {WHY[stop['reason']]}"]
     alike = Counter((_at(ray["stop"]), WHY[ray["stop"]["reason"]]) for ray in rays)
-    return [f"{_rays(n)} ended{f'{at}:' if at else ' at their'} {why}" for (at, why), n in alike.most_common()]
+    return [f"{counted(n, 'ray')} ended{f'{at}:' if at else ' at their'} {why}" for (at, why), n in alike.most_common()]
 
 
 def missed(shot: Mapping[str, Any]) -> tuple[str, str] | None:
@@ -213,7 +110,7 @@ def blocked(shot: Mapping[str, Any]) -> list[tuple[str, str]]:
             continue
         behind = ", ".join(short(hidden["name"]) for hidden in entry["blocked"])
         if behind or len(shot["rays"]) > 1:
-            text = f"{name} ends {_rays(entry['samples'])}"
+            text = f"{name} ends {counted(entry['samples'], 'ray')}"
             lines.append((text, f"in front of {behind}" if behind else "nothing behind it"))
     return lines
 
@@ -224,8 +121,9 @@ def _at(stop: Mapping[str, Any]) -> str:
     return f" {'in' if stop['reason'] == 'budget' else 'at'} {stop['item']['name']}"
 
 
-def _rays(n: int) -> str:
-    return f"{n} ray" + ("" if n == 1 else "s")
+def counted(n: int, what: str) -> str:
+    """Number of things, whose name gets an s if there is not one."""
+    return f"{n} {what}" + ("" if n == 1 else "s")
 
 
 def _short(ray: Mapping[str, Any], miss: Mapping[str, Any]) -> bool:
