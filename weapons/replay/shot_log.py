@@ -6,11 +6,12 @@ import json
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from itertools import chain
 from typing import Any, BinaryIO
 
 import numpy as np
+import numpy.typing as npt
 
 from hitplanes.planes.bits.bit_rows import Words
 from hitplanes.planes.common.checks import Floats, InputError, Ints, choice, integer, within
@@ -29,6 +30,7 @@ from hitplanes.planes.common.tables import (
     distinct_keys,
 )
 from hitplanes.planes.grid.fixed_point import snap
+from hitplanes.planes.grid.spans import Columns
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
@@ -115,14 +117,11 @@ def _check_aim(weapon: Weapon, shot: Mapping[str, Any]) -> None:
 
 def fire_request(scene: Scene, request: ShotRequest, prefilter: str = "auto", broadphase: str = "auto") -> Hits:
     """Fire one shot; the pre-filter and the broad phase are those of `fire`."""
-    alike = {name: getattr(request, name) for name in ("at", "aim", "toward", "accept", "blocked_by", "seed")}
-    how: dict[str, Any] = {
-        "exclude": request.exclude or None,
-        "shot": [request.shot],
-        "prefilter": prefilter,
-        "broadphase": broadphase,
-    }
-    return fire(scene, request.weapon, **alike, **how)
+    return fire(
+        scene, request.weapon, request.at, aim=request.aim, toward=request.toward, accept=request.accept,
+        blocked_by=request.blocked_by, exclude=request.exclude or None, seed=request.seed, shot=[request.shot],
+        prefilter=prefilter, broadphase=broadphase,
+    )  # fmt: skip
 
 
 def fire_shots(scene: Scene) -> list[Hits]:
@@ -177,28 +176,28 @@ FEW = 16  # unusual lines are read one by one if there are at most this many; ot
 _decode = json.JSONDecoder(object_pairs_hook=distinct_keys).raw_decode
 
 
+Objects = npt.NDArray[np.object_]
+
+
 @dataclass(frozen=True, eq=False)
-class Salvo:
+class Salvo(Columns):
     """Checked shots of any weapons, as columns."""
 
-    weapon: list[Weapon]  # of each shot
+    weapon: Objects  # (n,)
     at: Floats  # (n, 2) px
     aim: Floats  # (n,) degrees
     toward: Floats  # (n, 2) px; NaN for a shot that has an aim
     accept: Ints  # (n,) category bits
     blocked_by: Ints  # (n,) category bits
-    exclude: list[tuple[int, ...]]  # ids of owners, a tuple for each shot
+    exclude: Objects  # (n,) tuples of the ids of owners
     seed: Words  # (n,) that selects the random draws, with the number
     number: Ints  # (n,)
-
-    def __len__(self) -> int:
-        return len(self.weapon)
 
     def groups(self) -> dict[tuple[Weapon, bool, int], Ints]:
         """Group shots that one call can fire: by weapon, kind of aim (angle or point) and number of excluded owners."""
         found: dict[tuple[Weapon, bool, int], list[int]] = {}
         aimed = (~np.isnan(self.toward[:, 0])).tolist()
-        for row, key in enumerate(zip(self.weapon, aimed, map(len, self.exclude), strict=True)):
+        for row, key in enumerate(zip(self.weapon.tolist(), aimed, map(len, self.exclude), strict=True)):
             found.setdefault(key, []).append(row)
         return {key: np.array(rows) for key, rows in found.items()}
 
@@ -209,40 +208,33 @@ class Salvo:
             "toward" if toward else "aim": self.toward[rows] if toward else self.aim[rows],
             "accept": self.accept[rows],
             "blocked_by": self.blocked_by[rows],
-            "exclude": np.array([self.exclude[row] for row in rows.tolist()]) if owners else None,
+            "exclude": np.array(self.exclude[rows].tolist()) if owners else None,
             "seed": self.seed[rows],
             "shot": self.number[rows],
         }
-
-    def take(self, row: int) -> Salvo:
-        """Return a salvo of one shot."""
-        part = slice(row, row + 1)
-        return Salvo(*(getattr(self, f.name)[part] for f in fields(self)))
-
-    @classmethod
-    def joined(cls, parts: Sequence[Salvo]) -> Salvo:
-        """Join several salvos in order."""
-        columns = [[getattr(part, f.name) for part in parts] for f in fields(cls)]
-        whole: list[Any] = [list(chain(*c)) if isinstance(c[0], list) else np.concatenate(c) for c in columns]
-        return cls(*whole)
 
     @classmethod
     def of_requests(cls, requests: Sequence[ShotRequest]) -> Salvo:
         """Return the columns of checked shots."""
         return cls(
-            [request.weapon for request in requests],
+            column_of([request.weapon for request in requests]),
             np.array([request.at for request in requests], np.float64).reshape(-1, 2),
             np.array([request.aim or 0.0 for request in requests], np.float64),
             np.array([request.toward or NOWHERE for request in requests], np.float64).reshape(-1, 2),
             np.array([request.accept for request in requests], np.int64),
             np.array([request.blocked_by for request in requests], np.int64),
-            [request.exclude for request in requests],
+            column_of([request.exclude for request in requests]),
             np.array([request.seed for request in requests], np.uint64),
             np.array([request.shot for request in requests], np.int64),
         )
 
 
 NOWHERE = (float("nan"), float("nan"))
+
+
+def column_of(values: list[Any]) -> Objects:
+    """Column of Python objects; tuples stay whole."""
+    return np.fromiter(values, np.object_, len(values))
 
 
 def read_lines(log: BinaryIO, count: int) -> list[bytes]:
@@ -316,13 +308,15 @@ class ShotReader:
         points = np.full((len(shots), 2), np.nan)
         points[aimed] = _points([point for point in toward if point is not None])
         return Salvo(
-            [self.weapons[gun] if type(gun := shot["weapon"]) is str else weapon_from_json(gun) for shot in shots],
+            column_of(
+                [self.weapons[gun] if type(gun := shot["weapon"]) is str else weapon_from_json(gun) for shot in shots]
+            ),
             _points([shot["at"] for shot in shots]),
             _numbers([0.0 if angle is None else angle for angle in aim], AIM_MAX),
             points,
             np.array([self._categories(shot, "accept") for shot in shots], np.int64),
             np.array([self._categories(shot, "blocked_by") for shot in shots], np.int64),
-            [self._passed_over(shot["exclude"]) if "exclude" in shot else () for shot in shots],
+            column_of([self._passed_over(shot["exclude"]) if "exclude" in shot else () for shot in shots]),
             np.array(_whole([shot.get("seed", 0) for shot in shots]), np.uint64),
             np.array(_whole([shot.get("shot", row) for row, shot in enumerate(shots, first)]), np.int64),
         )

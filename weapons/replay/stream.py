@@ -72,26 +72,9 @@ class Progress:
 
     def show(self, shots: int, at: int) -> None:
         """Draw the line, unless it was drawn a moment ago: shots answered so far, and the bytes of their lines."""
-        now = time.monotonic()
-        if not self._draws or now - self._drawn < SECONDS:
+        if not self._is_due():
             return
-        self._drawn = now
-        self._draw(self._text(shots, at, max(now - self._begin, SECONDS)))
-
-    def step(self, what: str, done: int, of: int) -> None:
-        """Draw the present step and the number of steps done, unless the line was drawn a moment ago."""
-        now = time.monotonic()
-        if self._draws and now - self._drawn >= SECONDS:
-            self._drawn = now
-            full = BAR * done // max(of, 1)
-            self._draw(f"[{'#' * full}{'.' * (BAR - full)}] {done} of {of}, {what}")
-
-    def clear(self) -> None:
-        """Clear the line of the terminal."""
-        if self._width:
-            self._draw("")
-
-    def _text(self, shots: int, at: int, seconds: float) -> str:
+        seconds = max(self._drawn - self._begin, SECONDS)
         shots_before, at_before = self._before
         texts = [f"{shots:,} {self._what}", f"{(shots - shots_before) / seconds:,.0f}/s"]
         if self._size:
@@ -100,7 +83,25 @@ class Progress:
             if rate > 0:
                 left = round(max(self._size - at, 0) / rate)
                 texts.append(f"{left // 3600}:{left // 60 % 60:02}:{left % 60:02} left")
-        return ", ".join(texts)
+        self._draw(", ".join(texts))
+
+    def step(self, what: str, done: int, of: int) -> None:
+        """Draw the present step and the number of steps done, unless the line was drawn a moment ago."""
+        if self._is_due():
+            full = BAR * done // max(of, 1)
+            self._draw(f"[{'#' * full}{'.' * (BAR - full)}] {done} of {of}, {what}")
+
+    def clear(self) -> None:
+        """Clear the line of the terminal."""
+        if self._width:
+            self._draw("")
+
+    def _is_due(self) -> bool:
+        """Whether it is time to draw the line again; the time of this drawing is noted."""
+        now = time.monotonic()
+        due = self._draws and now - self._drawn >= SECONDS
+        self._drawn = now if due else self._drawn
+        return due
 
     def _draw(self, text: str) -> None:
         text = text[: shutil.get_terminal_size().columns - 1]
@@ -279,7 +280,7 @@ PASSES = (
 """Columns of a pass of a ray; a name that ends in _xy stands for two numbers."""
 
 STOPS = ("round", "pellet", "reason", "item", "cell_xy", "distance", "normal_xy")
-"""ShotColumns of the end of a ray; a name that ends in _xy stands for two numbers."""
+"""Columns of the end of a ray; a name that ends in _xy stands for two numbers."""
 
 LINES_FIRST, LINES_MAX = 16, 16384  # of the first chunk, as each shot may hit thousands, and of the largest useful one
 
@@ -465,7 +466,7 @@ def _fired_one_by_one(
     for row, body in enumerate(bodies[: len(salvo)]):
         try:
             with within(reader.place(done.shots + row)):
-                answers += _fired(salvo.take(row), [body], reader, done.plan)
+                answers += _fired(salvo.take(slice(row, row + 1)), [body], reader, done.plan)
         except InputError as error:
             return answers, error
     return answers, None
