@@ -258,13 +258,10 @@ class ShotReader:
     def __init__(self, scene: Scene, weapons: Mapping[str, Weapon], name: str) -> None:
         self.scene, self.weapons, self._name = scene, weapons, name
         self._bits = {category: 1 << bit for bit, category in enumerate(scene.categories)}
-        self._owners: dict[str, int] = {}
         ids = scene.ids()
-        named = list(map(scene.name_of, ids.tolist()))
-        times = Counter(named)
-        for name_of, owner in zip(named, scene.owner(ids).tolist(), strict=True):
-            if times[name_of] == 1:
-                self._owners[name_of] = owner
+        names, owners = list(map(scene.name_of, ids.tolist())), scene.owner(ids).tolist()
+        times = Counter(names)
+        self._owners = {name: owner for name, owner in zip(names, owners, strict=True) if times[name] == 1}
 
     def place(self, line: int) -> str:
         """Return the place of a line for errors; `line` counts from 0, the text from 1 as editors do."""

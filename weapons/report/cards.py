@@ -135,10 +135,10 @@ def shot_card(shot: Mapping[str, Any], number: int, scene: Scene, now: str | Non
     lines += [*blockers[:NOT_LINES], *_rest(blockers, NOT_LINES, " block")]
     others = shot["why_not"]
     if near is not None:
-        same = [e["object"] == shot["nearest_miss"]["object"] and e["reason"] == "missed" for e in others]
-        risks = [fragile(e, "hits it") for e, own in zip(others, same, strict=True) if own]
+        own = [e for e in others if e["object"] == shot["nearest_miss"]["object"] and e["reason"] == "missed"]
+        risks = [fragile(e, "hits it") for e in own]
         lines.append((near[0], "; ".join([near[1], *filter(None, risks)])))
-        others = [e for e, own in zip(others, same, strict=True) if not own]
+        others = [e for e in others if e not in own]
     lines += [(f"not {entry['name']}", _why(entry, rays is not None)) for entry in others[:NOT_LINES]]
     lines += _rest(others, NOT_LINES, " near it")
     if now is not None:

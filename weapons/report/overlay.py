@@ -59,10 +59,8 @@ class Overlay:
         bx, by = self._free(x, y, SHOT_BADGE + 1, SHOT_BADGE + 1)
         if inside:
             cv2.line(self.image, (x, y), (bx, by), WHITE, 1)
-            size = max(3, self.factor)
             for color, thick in ((DARK, 3), (WHITE, 1)):
-                cv2.line(self.image, (x - size, y), (x + size, y), color, thick)
-                cv2.line(self.image, (x, y - size), (x, y + size), color, thick)
+                cv2.drawMarker(self.image, (x, y), color, cv2.MARKER_CROSS, 2 * max(3, self.factor), thick)
         else:
             cv2.arrowedLine(self.image, (bx, by), (x, y), WHITE, 1, tipLength=0.4)
         cv2.circle(self.image, (bx, by), SHOT_BADGE - 1, DARK, -1)

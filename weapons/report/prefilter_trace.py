@@ -43,8 +43,11 @@ class PrefilterTrace:
     index: Index | None
     view_xyxy: Box  # box of the world that is shown
 
-    def to_dict(self, fired: Sequence[Hits]) -> dict[str, Any]:
-        """Names, and boxes of the cells of the view, as JSON, with which of them were opened for the shots of hits."""
+    def add_tests(self, fired: Sequence[Hits], shots: Sequence[dict[str, Any]]) -> dict[str, Any]:
+        """Add what was tested to the JSON of shots, of all of hits or of none; return the cells of the view as JSON."""
+        each = ((hits, row) for hits in fired for row in range(len(hits.shots)))
+        for shot, (hits, row) in zip(shots, each, strict=False):
+            shot["tested"] = self.tests_of(hits, row)
         number, boxes = self._cells()
         opened = np.unique(np.concatenate([np.zeros(0, np.int64), *(self.opened(hits) for hits in fired)]))
         if len(boxes) > CELLS_MAX:
@@ -56,13 +59,6 @@ class PrefilterTrace:
             "broadphase": self.index.structure if self.index else "none",
             "cells": cells,
         }
-
-    def add_tests(self, fired: Sequence[Hits], shots: Sequence[dict[str, Any]]) -> dict[str, Any]:
-        """Add what was tested to the JSON of shots, of all of hits or of none, and return what `to_dict` does."""
-        each = ((hits, row) for hits in fired for row in range(len(hits.shots)))
-        for shot, (hits, row) in zip(shots, each, strict=False):
-            shot["tested"] = self.tests_of(hits, row)
-        return self.to_dict(fired)
 
     def tests_of(self, hits: Hits, row: int) -> dict[str, Any]:
         """Objects whose pixels a shot was tested against, number of all items, and number of opened cells, as JSON."""

@@ -147,7 +147,7 @@ class Strokes:
         reach += CASING + 1
         cut_from, cut_to = within(begin[None], end[None], np.array(self.shape[::-1]), 2 * reach)
         if not len(cut_from):
-            return _NOWHERE
+            return (np.zeros(0),) * 4
         a, b = cut_from[0], cut_to[0]
         x, y = _pixels(a, b, reach, self.shape)
         step = b - a
@@ -161,15 +161,10 @@ class Strokes:
         return x, y, np.sqrt(beside**2 + over**2), along
 
 
-_NOWHERE = (np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0))
-
-
 def _pixels(a: Floats, b: Floats, reach: float, shape: tuple[int, int]) -> tuple[Floats, Floats]:
     """Middles (x, y) of the pixels of a picture within `reach` of a segment, and of some more; each once."""
     low = np.floor(np.maximum(np.minimum(a, b) - reach, 0))
     high = np.ceil(np.minimum(np.maximum(a, b) + reach, shape[::-1]))
-    if (low >= high).any():
-        return np.zeros(0), np.zeros(0)
     step = b - a
     main = int(abs(step[1]) > abs(step[0]))
     at = np.arange(low[main], high[main]) + 0.5
