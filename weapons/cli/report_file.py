@@ -62,17 +62,16 @@ def _all(keys: dict[str, Value], **more: Value) -> Within:
 
 RAN = Keys({**STAGE, "bytes": COUNT, "pairs": Wholes((2,), 0, 2**62)}, ("stage", "why", "bytes"))
 PLAN = _all({"ran": Rows(Within(RAN)), "left_out": Rows(_all(STAGE))})
-ROW_TOLD: dict[str, Value] = {
-    **ITEM, "round": COUNT, "samples": COUNT, "pixels": COUNT, "weight": COUNT, "pellets": COUNT, "first_xy": PIXEL,
-    "distance2": COUNT, "runs": RUNS,
-}  # fmt: skip
 SHARES = _all({"of_pattern": SHARE, "of_visible": SHARE, "of_mask": SHARE}, exposed=SHARE)
 MARGIN = _all({"distance": Number(0, MARGIN_PX), "shift_xy": Numbers((2,), MARGIN_PX)})
-ROW = _all(ROW_TOLD, shares=SHARES, margin=MARGIN)
-WHY_NOT: dict[str, Value] = {
+ROW = _all({
+    **ITEM, "round": COUNT, "samples": COUNT, "pixels": COUNT, "weight": COUNT, "pellets": COUNT, "first_xy": PIXEL,
+    "distance2": COUNT, "runs": RUNS,
+}, shares=SHARES, margin=MARGIN)  # fmt: skip
+WHY_NOT = _all({
     **ITEM, "reason": Word(REASONS), "samples": COUNT, "by": Rows(_all({**ITEM, "samples": COUNT})),
     "distance": Number(0),
-}  # fmt: skip
+}, margin=MARGIN)  # fmt: skip
 POINT = Numbers((2,), FARTHEST)
 NORMAL = Wholes((2,), -(2**10), 2**10)
 PASS = _all({
@@ -81,29 +80,24 @@ PASS = _all({
     **dict.fromkeys(("entry", "exit"), Number(0, 1)), "point": POINT, "normal": NORMAL, "weight": COUNT,
 })  # fmt: skip
 STOP = _all({
-    "reason": Word(tuple(reason.name.lower() for reason in Reason)), "item": Optional(_all(dict(ITEM))),
+    "reason": Word(tuple(reason.name.lower() for reason in Reason)), "item": Optional(_all(ITEM)),
     "cell_xy": PIXEL, "point": POINT, "distance": Number(0), "fraction": Number(0, 1), "normal": NORMAL,
 })  # fmt: skip
 RAY = _all({"round": COUNT, "pellet": COUNT, "start": POINT, "end": POINT, "stop": STOP, "passes": Rows(PASS)})
 MISS = _all({**ITEM, "distance": Number(0), "ray_xy": POINT, "object_xy": POINT})
-RAYS: dict[str, Value] = {"radius": Number(0, REACH_MAX), "rays": Rows(RAY), "nearest_miss": Optional(MISS)}
-"""Further keys of a shot of rays."""
-
 TESTED = _all({
     "objects": Wholes((None,), 0, IDS_MAX - 1), "of": COUNT, "opened": COUNT,
     "patterns": Rows(_all({"points": Numbers((None, 2), FARTHEST)})),
 })  # fmt: skip
 BLOCKED = _all({**ITEM, "samples": COUNT, "at_xy": PIXEL})
-SHOT_TOLD: dict[str, Value] = {
+SHOT = _all({
     "shot": Whole(0, 2**63 - 1), "weapon": Text(), "at": Numbers((2,), POSITION_MAX), "at_xy": PIXEL,
     "aim": Optional(Number(-180, 180)), "seed": Whole(0, SEED_MAX), "accept": Optional(Names()),
-    "blocked_by": Optional(Names()),
-    "exclude": Rows(_all({"owner": COUNT, "name": Text()})), "verdicts": COUNTS, "rows": Rows(ROW),
-    "why_not": Rows(_all(WHY_NOT, margin=MARGIN)),
+    "blocked_by": Optional(Names()), "exclude": Rows(_all({"owner": COUNT, "name": Text()})),
+    "verdicts": COUNTS, "rows": Rows(ROW), "why_not": Rows(WHY_NOT),
     "blockers": Rows(_all({**ITEM, "samples": COUNT, "blocked": Rows(BLOCKED)})),
     "samples": Within(Keys(dict.fromkeys(VERDICTS, RUNS))), "plan": PLAN,
-}  # fmt: skip
-TOLD = _all(SHOT_TOLD, **RAYS, tested=TESTED, sheltered=RUNS)
+}, radius=Number(0, REACH_MAX), rays=Rows(RAY), nearest_miss=Optional(MISS), tested=TESTED, sheltered=RUNS)  # fmt: skip
 CELL = _all({"box_xyxy": Numbers((4,), FARTHEST), "opened": Flag()})
 FILTER = _all({"prefilter": Text(), "broadphase": Word(tuple(STRUCTURES)), "cells": Rows(CELL)})
 HEAT = _all({
@@ -115,18 +109,18 @@ BATCH = _all({
     "objects": Rows(_all({**ITEM, "shots": COUNT, "pixels": COUNT, "weight": COUNT})), "columns": Names(),
     "rows": Wholes((None, 10), -FARTHEST, 2**62), "heat": HEAT, "plan": Rows(PLAN),
 })  # fmt: skip
-SCENE_TOLD = _all({
+SCENE = _all({
     "name": Text(), "hash": Text(), "version": COUNT, "bounds_xyxy": Optional(BOX), "hittable": COUNT,
     "occluders": COUNT,
 })  # fmt: skip
 KEYS: dict[str, Value] = {
-    "format": Const(FORMAT), "version": Text(), "scene": SCENE_TOLD, "view_xyxy": BOX,
-    "weapons": Mapped(WeaponJson("weapon")), "shots": Rows(TOLD), "batch": Optional(BATCH),
+    "format": Const(FORMAT), "version": Text(), "scene": SCENE, "view_xyxy": BOX,
+    "weapons": Mapped(WeaponJson("weapon")), "shots": Rows(SHOT), "batch": Optional(BATCH),
 }  # fmt: skip
 NOW = _all({
     "tick": Optional(Number(-TICK_MAX, TICK_MAX)), "hash": Text(),
     "moved": Rows(_all({**ITEM, "runs": RUNS, "from_xy": POINT, "to_xy": POINT})),
-    "gone": Rows(_all(dict(ITEM))), "new": Rows(_all(dict(ITEM))),
+    "gone": Rows(_all(ITEM)), "new": Rows(_all(ITEM)),
     "shots": Rows(Optional(Rows(_all({**ITEM, "pixels": COUNT})))),
 })  # fmt: skip
 REPORT = Keys({**KEYS, "filter": FILTER, "now": NOW}, tuple(KEYS))  # table that validates a report
