@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from .check import Collected
 
 
-GOLDENS = "goldens"  # name of the folder of goldens beside the test files
 WORKER_KEY = "hitplanes"  # key under which a worker of pytest-xdist sends the tests that it collected
 REPORT_KEY = "hits_golden"  # attribute of a test report that holds the outcomes of the test's goldens
 RECORDS = pytest.StashKey[list[dict[str, Any]]]()  # key of the outcomes in the stash of a test
@@ -38,7 +37,7 @@ def pytest_configure(config: pytest.Config) -> None:
         from .check import Collected
 
         # with --lf pytest does not report all tests of a file, so we cannot say that one is gone
-        collected = Collected(GOLDENS, whole=not config.getoption("lf", False))
+        collected = Collected(whole=not config.getoption("lf", False))
         config.pluginmanager.register(collected, "hitplanes-collected")
     config.pluginmanager.register(Run(config, collected), "hitplanes-run")
 
@@ -97,7 +96,7 @@ class HitsGolden:
         check_present(hits)
         tolerance = tolerance_of(only, tolerance_pixels, tolerance_px)
         self._take(name)
-        call = Call.of(self._item, GOLDENS, name, only, tolerance)
+        call = Call.of(self._item, name, only, tolerance)
         outcome = settle(call, hits, {} if planes is None else planes)
         record = {"golden": str(call.base), "outcome": outcome.kind, "failure": outcome.failure}
         self._item.stash.setdefault(RECORDS, []).append(record)
@@ -135,10 +134,10 @@ class Run:
             self._outcomes[record["golden"]] = record
             if record["outcome"] == "updated":
                 self._updated.add(Path(record["golden"]))
-        if self._collected is not None and report.when == "call" and report.passed:
-            self._passed.add(report.nodeid)
-        elif not report.passed:
+        if not report.passed:
             self._unpassed.add(report.nodeid)
+        elif report.when == "call":
+            self._passed.add(report.nodeid)
 
     @pytest.hookimpl(optionalhook=True)
     def pytest_testnodedown(self, node: Any) -> None:
@@ -158,8 +157,7 @@ class Run:
         if self._collected is not None:
             from .check import stale_goldens
 
-            passed = self._passed - self._unpassed
-            self._stale = stale_goldens(self._collected, GOLDENS, set(self._outcomes), passed)
+            self._stale = stale_goldens(self._collected, set(self._outcomes), self._passed - self._unpassed)
             if self._stale and session.exitstatus == pytest.ExitCode.OK:
                 session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
@@ -191,8 +189,6 @@ class Run:
             self._page = folder / PAGE
 
     def _shown(self, path: Path) -> str:
-        from hitplanes.planes.common.checks import printable
+        from .check import printed
 
-        from .check import relative
-
-        return printable(relative(path, self._config.invocation_params.dir))
+        return printed(path, self._config.invocation_params.dir)

@@ -171,6 +171,7 @@ def _close(folder: Path, prefix: str, was: Image, now: Image, differ: Bools, sid
     return [*whole, (around, f"{prefix}crop.png")]
 
 
+GOLDENS = "goldens"  # name of the folder of goldens beside the test files
 FOLDER = "hits-failures"  # folder of failures, in the root of the tests
 PAGE = "index.html"  # page of the failures
 LIST = "files.txt"  # list of the files that belong to us; its first line is MARK
@@ -249,6 +250,11 @@ def relative(path: Path, start: Path) -> str:
         return os.path.relpath(path, start).replace(os.sep, "/")
     except ValueError:
         return path.as_posix()
+
+
+def printed(path: Path, start: Path) -> str:
+    """Return a path relative to `start` as it is printed."""
+    return printable(relative(path, start))
 
 
 def _delete(folder: Path, names: Iterable[str]) -> None:
@@ -340,17 +346,13 @@ class Call:
     tolerance: Tolerance = EXACT  # how much the rows of hits alone may differ
 
     @classmethod
-    def of(cls, item: pytest.Item, folder: str, name: str | None, only: str | None, tolerance: Tolerance) -> Call:
-        """Return the call of a test whose goldens are in a folder of this name beside its file."""
+    def of(cls, item: pytest.Item, name: str | None, only: str | None, tolerance: Tolerance) -> Call:
+        """Return the call of a test."""
         inside, config = item.nodeid.partition("::")[2], item.config
-        base = item.path.parent / folder / item.path.stem / safe_name(inside, name)
+        base = item.path.parent / GOLDENS / item.path.stem / safe_name(inside, name)
         here, update = config.invocation_params.dir, bool(config.getoption("hits_update"))
         test = f"{item.path.name}::{inside}"
         return cls(item.nodeid, test, name, base, config.rootpath, here, update, only, tolerance)
-
-    def shown(self, path: Path) -> str:
-        """Return a path as it is printed."""
-        return printable(relative(path, self.here))
 
 
 @dataclass(frozen=True)
@@ -412,12 +414,12 @@ def _show(
     call: Call, lines: list[str], expected: Golden | None, got: Golden, changed: Unlike
 ) -> tuple[dict[str, Any], str]:
     """Write the files of a failure; return its entry on the page, and the path to look at."""
-    golden = f"{call.shown(call.base)}.json"
+    golden = f"{printed(call.base, call.here)}.json"
     failure: dict[str, Any] = {"test": call.node, "golden": golden, "lines": lines[:PAGE_LINES_MAX]}
     failure |= {"folder": "", "texts": [], "rows": []}
     folder, name = call.root / FOLDER, safe_name(relative(call.base, call.root))
     if not claimed(folder):
-        return failure, f"nowhere: {call.shown(folder)} is there, and not ours"
+        return failure, f"nowhere: {printed(folder, call.here)} is there, and not ours"
     texts = {"expected.json": expected, "got.json": got}
     try:
         note_files(folder, [f"{name}/{file}" for file in (*texts, *pictures_of(changed))])
@@ -429,20 +431,20 @@ def _show(
     except (OSError, InputError) as error:
         return failure, f"nowhere: {error}"
     failure |= {"folder": name, "texts": [file for file, side in texts.items() if side is not None], "rows": rows}
-    return failure, call.shown(folder / PAGE)
+    return failure, printed(folder / PAGE, call.here)
 
 
 KINDS = (".json", ".npz", ".png")  # endings of the files of a golden
 
 
 class Collected:
-    """Plugin that lists the tests of all files that have goldens beside them, in folders of this name.
+    """Plugin that lists the tests of all files that have goldens beside them.
 
     `whole` says whether pytest reports all tests of a file.
     """
 
-    def __init__(self, folder: str, *, whole: bool) -> None:
-        self._folder, self._whole = folder, whole
+    def __init__(self, *, whole: bool) -> None:
+        self._whole = whole
         self.files: dict[str, str] = {}  # node ids of test files, by path
         self.whole: set[str] = set()  # node ids of the files and classes whose tests are all known
         self.known: set[str] = set()  # node ids of the tests and classes in them, whether selected to run or not
@@ -454,7 +456,7 @@ class Collected:
         """Note the tests of a file or a class."""
         report = yield
         above = isinstance(collector, pytest.Session | pytest.Directory)
-        if not above and (collector.path.parent / self._folder).is_dir():
+        if not above and (collector.path.parent / GOLDENS).is_dir():
             if isinstance(collector, pytest.File):
                 self.files[str(collector.path)] = collector.nodeid
             self.known |= {node.nodeid for node in report.result or ()}
@@ -473,7 +475,7 @@ class Collected:
         self.known |= set(sent["known"])
 
 
-def stale_goldens(collected: Collected, folder: str, used: set[str], passed: set[str]) -> list[Path]:
+def stale_goldens(collected: Collected, used: set[str], passed: set[str]) -> list[Path]:
     """Return the paths, without endings, of goldens that no test uses.
 
     A golden is stale if its test passed without using it, or no longer exists. A test that was deselected, skipped or
@@ -483,7 +485,7 @@ def stale_goldens(collected: Collected, folder: str, used: set[str], passed: set
     stale = []
     for place in sorted({place for place, _ in by_place}):
         there = {path.stem for path in place.iterdir() if path.is_file()}
-        for goldens in sorted(path for path in (place / folder).glob("*") if path.is_dir()):
+        for goldens in sorted(path for path in (place / GOLDENS).glob("*") if path.is_dir()):
             file = by_place.get((place, goldens.name))
             for base in sorted({path.with_name(path.stem) for path in goldens.iterdir() if path.suffix in KINDS}):
                 gone = goldens.name not in there
