@@ -147,13 +147,19 @@ class Run:
             self._collected.add(sent)
 
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
-        """Write the page of failures and find stale goldens; a worker sends the tests that it collected."""
+        """Replace the page of failures and find stale goldens; a worker sends the tests that it collected."""
         if hasattr(self._config, "workerinput"):
             if self._collected is not None:
                 self._config.workeroutput[WORKER_KEY] = self._collected.to_json()  # type: ignore[attr-defined]
             return
         if self._outcomes:
-            self._write_page()
+            from .check import FOLDER, PAGE, replace_page
+
+            records = [record["failure"] for record in self._outcomes.values() if record["outcome"] == "failed"]
+            failures = sorted(records, key=lambda failure: (failure["test"], failure["golden"]))
+            folder = self._config.rootpath / FOLDER
+            if replace_page(folder, failures):
+                self._page = folder / PAGE
         if self._collected is not None:
             from .check import stale_goldens
 
@@ -177,16 +183,6 @@ class Run:
         if self._page is not None:
             failed = sum(record["outcome"] == "failed" for record in self._outcomes.values())
             terminalreporter.line(f"{counted(failed, 'golden')} failed: {self._shown(self._page)}")
-
-    def _write_page(self) -> None:
-        """Replace the page of an earlier run by that of this run's failures; without failures, delete it."""
-        from .check import FOLDER, PAGE, replace_page
-
-        records = [record["failure"] for record in self._outcomes.values() if record["outcome"] == "failed"]
-        failures = sorted(records, key=lambda failure: (failure["test"], failure["golden"]))
-        folder = self._config.rootpath / FOLDER
-        if replace_page(folder, failures):
-            self._page = folder / PAGE
 
     def _shown(self, path: Path) -> str:
         from .check import printed

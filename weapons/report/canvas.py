@@ -162,7 +162,7 @@ class World:
 
     def outline(self, item: int, kind: str) -> None:
         """Draw the border of an object's mask inside its pixels: thick for "hit", thick and dashed for "blocked"."""
-        if self.scene is not None:
+        if self.scene is not None and item in self.scene:
             self.border(*self.scene.mask(item), kind)
 
     def outline_runs(self, runs: Sequence[Sequence[int]], kind: str) -> None:

@@ -19,15 +19,13 @@ from hitplanes.planes.scene.scene import Scene
 
 from .canvas import DARK, INK, OUTLINES, OUTLINES_MAX, Text, World, covered, enlarged
 from .phrases import NAME_MAX, apart, short
-from .symbols import BADGE, MARKS, MINT, NEAR_MISS, Signs, Strokes
+from .symbols import BADGE, MARKS, MINT, NEAR_MISS, WHITE, Signs, Strokes
 
 LETTER, ROW = 7, 17  # width of a letter and height of a label, px; not the font's, which depend on OpenCV's version
 LABELS_MAX = 16  # most names in one picture; the cards have all
 LINKS_MAX = 8  # most occluders that are linked to the object they kept most samples from; the cards have all
 SHOT_BADGE = 11  # radius of the disc of a shot's number, px
 NEAR, CLOSE, FAR = 40, 110, 400  # how far a name may lie from its object, a link if it can, and a link or a number, px
-
-WHITE = (255, 255, 255)
 
 
 class Overlay:

@@ -216,8 +216,7 @@ def _marked(world: World, report: Mapping[str, Any]) -> list[Text]:
     world.mark_samples(report["shots"], OF_RAYS)
     for verdict in MARKS if report["batch"] else ():
         world.mark_heat(report["batch"], verdict)
-    there = set() if world.scene is None else set(world.scene.ids().tolist())
-    for item in sorted(there & {row["object"] for shot in report["shots"] for row in shot["rows"]}):
+    for item in sorted({row["object"] for shot in report["shots"] for row in shot["rows"]}):
         world.outline(item, "hit")
     numbers, drawn = draw_rays(world, report)
     overlay = Overlay(world)
