@@ -322,11 +322,9 @@ def _checked(path: Path) -> dict[str, Any]:
     written = data.get("format") if isinstance(data, dict) else None
     if written == FORMAT:
         return dict(data)
-    if isinstance(written, str) and re.fullmatch(r"hitplanes-golden/\d+", written):
-        raise ForeignGoldenError(
-            f"{path}: expected {FORMAT!r}, got {written!r}: made by a newer hitplanes; it is left alone"
-        )
-    raise ForeignGoldenError(f"{path}: expected {FORMAT!r}, got format {written!r:.60}: no golden; it is left alone")
+    newer = isinstance(written, str) and re.fullmatch(r"hitplanes-golden/\d+", written)
+    got = f"{written!r}: made by a newer hitplanes" if newer else f"format {written!r:.60}: no golden"
+    raise ForeignGoldenError(f"{path}: expected {FORMAT!r}, got {got}; it is left alone")
 
 
 def _read_planes(path: Path, listed: list[dict[str, Any]]) -> dict[str, Plane]:

@@ -123,24 +123,21 @@ class Card:
 def shot_card(shot: Mapping[str, Any], number: int, scene: Scene, now: str | None = None) -> Card:
     """Card of one shot; for a shot at the past with what it would hit now."""
     rays = shot.get("rays")
-    hit = _hits(shot) if rays is None else phrases.table(shot)
-    lines: list[Sequence[str]] = [*hit[: HIT_LINES + 1], *_rest(hit, HIT_LINES + 1, "")]
+    lines = _first_of(_hits(shot) if rays is None else phrases.table(shot), HIT_LINES + 1, "")
     lines += _at_risk(shot["rows"])
     near = None
     if rays is not None:
         near = phrases.missed(shot)
-        ends = phrases.ended(rays)
-        lines += [[line] for line in ends[:NOT_LINES]] + _rest(ends, NOT_LINES, " ends")
-    blockers = phrases.blocked(shot)
-    lines += [*blockers[:NOT_LINES], *_rest(blockers, NOT_LINES, " block")]
+        lines += _first_of([[line] for line in phrases.ended(rays)], NOT_LINES, " ends")
+    lines += _first_of(phrases.blocked(shot), NOT_LINES, " block")
     others = shot["why_not"]
     if near is not None:
         own = [e for e in others if e["object"] == shot["nearest_miss"]["object"] and e["reason"] == "missed"]
         risks = [fragile(e, "hits it") for e in own]
         lines.append((near[0], "; ".join([near[1], *filter(None, risks)])))
         others = [e for e in others if e not in own]
-    lines += [(f"not {entry['name']}", _why(entry, rays is not None)) for entry in others[:NOT_LINES]]
-    lines += _rest(others, NOT_LINES, " near it")
+    whys = [(f"not {entry['name']}", _why(entry, rays is not None)) for entry in others]
+    lines += _first_of(whys, NOT_LINES, " near it")
     if now is not None:
         lines.append(("the same shot now", now))
     if "tested" in shot:
@@ -152,8 +149,7 @@ def shot_card(shot: Mapping[str, Any], number: int, scene: Scene, now: str | Non
 def _at_risk(rows: Sequence[Mapping[str, Any]]) -> list[Sequence[str]]:
     """Lines about objects that a shift of one pixel would miss."""
     risks = {row["name"]: fragile(row, "misses it") for row in rows}
-    lines = [(name, risk) for name, risk in risks.items() if risk is not None]
-    return [*lines[:NOT_LINES], *_rest(lines, NOT_LINES, " fragile")]
+    return _first_of([(name, risk) for name, risk in risks.items() if risk is not None], NOT_LINES, " fragile")
 
 
 def _why(entry: Mapping[str, Any], of_ray: bool) -> str:
@@ -196,12 +192,14 @@ def batch_cards(report: Mapping[str, Any]) -> list[Card]:
     shots = batch["shots"]
     total = f"{shots} shots, {batch['shots_that_hit']} hit something"
     never = report["scene"]["hittable"] - len(batch["objects"])
-    lines: list[Sequence[str]] = [BATCH_HEADER] if batch["objects"] else []
-    for entry in batch["objects"][:HIT_LINES]:
-        share = percent(entry["shots"] / shots)
-        weight = f"{entry['weight'] / WEIGHT_FULL:.1f}"
-        lines.append((entry["name"], str(entry["shots"]), share, str(entry["pixels"]), weight))
-    lines += _rest(batch["objects"], HIT_LINES, " hit")
+    rows = [
+        (
+            entry["name"], str(entry["shots"]), percent(entry["shots"] / shots), str(entry["pixels"]),
+            f"{entry['weight'] / WEIGHT_FULL:.1f}",
+        )
+        for entry in batch["objects"]
+    ]  # fmt: skip
+    lines: list[Sequence[str]] = [BATCH_HEADER, *_first_of(rows, HIT_LINES, " hit")] if rows else []
     lines.append([f"{never} of {report['scene']['hittable']} objects never hit" if never else "every object was hit"])
     if "filter" in report:
         lines.append(["volumes are drawn for a few shots only; cells for all"])
@@ -217,8 +215,10 @@ def _tested(tested: Mapping[str, Any]) -> str:
     return f"tested {len(tested['objects'])} of {tested['of']} objects and occluders by pixels{cells}"
 
 
-def _rest(entries: Sequence[Any], shown: int, what: str) -> list[list[str]]:
-    return [[f"and {len(entries) - shown} more{what}"]] if len(entries) > shown else []
+def _first_of(lines: Sequence[Sequence[str]], most: int, what: str) -> list[Sequence[str]]:
+    """First lines, and a line with the number of the others."""
+    more = len(lines) - most
+    return [*lines[:most], *([[f"and {more} more{what}"]] if more > 0 else [])]
 
 
 def place_text(at: Sequence[float]) -> str:
