@@ -42,6 +42,7 @@ from hitplanes import (  # fmt: skip
     fire,
     load_scene,
     picture_of_report,
+    prepare,
     read_png,
     replay,
     report_of,
@@ -358,6 +359,9 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
         lambda: fire(None, Disc(1), (0, 0)), "scene: expected a Scene or a History, got NoneType"),  # type: ignore[arg-type]
     "fire no weapon": (lambda: shot(weapon="disc"), "weapon: expected a weapon, got str"),
     "fire a class": (lambda: shot(weapon=Disc), "weapon: expected a weapon, got the class Disc"),
+    "prepare at a class": (lambda: prepare(Scene, Disc(1)), "scene: expected a Scene, got the class Scene"),
+    "history of a class": (lambda: History(Scene), "scene: expected a Scene, got the class Scene"),
+    "report of a class": (lambda: report_of(Scene, []), "scene: expected a Scene, got the class Scene"),
     "aim, NaN": (lambda: shot(aim=math.nan), "aim.*: expected a finite number, got nan"),
     "aim of a row": (
         lambda: shot(at=[(1, 2), (3, 4)], aim=[0, math.inf]), r"aim\[1\]: expected a finite number, got inf"),

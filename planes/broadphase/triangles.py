@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..broadphase import Bvh
-from ..common.checks import Bools, Floats, InputError, Ints, array_of, flag, integers, reals
+from ..common.checks import Bools, Floats, InputError, Ints, array_of, flag, integers, kind_of, reals
 from ..common.limits import CHUNK_SAMPLES, FLOAT_HUGE, FLOAT_TINY, ORIENT3D_ERROR
 from ..volumes.exact import chunked, orient2d, orient3d
 from ..volumes.overlap import overlap
@@ -124,7 +124,7 @@ def meeting_faces(a: Mesh, b: Mesh, conservative: bool = False) -> Ints:
     """
     for name, mesh in (("a", a), ("b", b)):
         if not isinstance(mesh, Mesh):
-            raise InputError(f"{name}: expected a mesh, got {type(mesh).__name__}")
+            raise InputError(f"{name}: expected a mesh, got {kind_of(mesh)}")
     pairs = b.tree.query(a.boxes)
     chunks = [pairs[:, k : k + CHUNK_SAMPLES] for k in range(0, pairs.shape[1], CHUNK_SAMPLES)]
     touching = [triangles_meet(a.corners[i], b.corners[j], conservative) for i, j in chunks]

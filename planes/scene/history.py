@@ -18,7 +18,7 @@ from weakref import WeakValueDictionary
 
 import numpy as np
 
-from ..common.checks import Bools, InputError, Ints, flag, integer, real, shown, within
+from ..common.checks import Bools, InputError, Ints, flag, integer, kind_of, real, shown, within
 from ..common.limits import HISTORY_TICKS_MAX, SUB, TICK_MAX
 from ..grid.fixed_point import rounded_div
 from ..grid.spans import Box
@@ -254,7 +254,7 @@ class History:
 
     def __init__(self, scene: Scene, ticks: int = 64, interpolate: bool = False) -> None:
         if not isinstance(scene, Scene):
-            raise InputError(f"scene: expected a Scene, got {type(scene).__name__}")
+            raise InputError(f"scene: expected a Scene, got {kind_of(scene)}")
         self.scene = scene
         self._most = integer("ticks", ticks, 1, HISTORY_TICKS_MAX)
         self._interpolate = flag("interpolate", interpolate)

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from ..common.checks import Bools, Floats, InputError, Ints, array_of, flag, reals
+from ..common.checks import Bools, Floats, InputError, Ints, array_of, flag, kind_of, reals
 from ..common.limits import CHUNK_ROWS, DISTANCE_ERROR, FLOAT_HUGE, FLOAT_TINY, LENGTH_TINY, SIDE_ERROR
 from ..grid.spans import ragged
 from .exact import Signs, circles_sign, orient2d, point_segment_sign, segment_segment_sign, squared_distance
@@ -232,7 +232,7 @@ def _line_between(a: Aabbs, b: Aabbs) -> Floats:
 
 def _checked(name: str, volume: Volumes) -> Volumes:
     if not isinstance(volume, Volumes):
-        raise InputError(f"{name}: expected volumes, got {type(volume).__name__}")
+        raise InputError(f"{name}: expected volumes, got {kind_of(volume)}")
     beyond = volume.beyond()
     if len(beyond):
         raise InputError(f"{name}: expected finite volumes, got bounds beyond the floats in row {beyond[0]}")

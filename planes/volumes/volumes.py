@@ -14,7 +14,7 @@ from typing import Self
 
 import numpy as np
 
-from ..common.checks import Floats, InputError, Ints, array_of, each, integers, reals, shown, within
+from ..common.checks import Floats, InputError, Ints, array_of, each, integers, kind_of, reals, shown, within
 from ..common.limits import TRIG_BITS
 from ..grid.fixed_point import unit
 from .polygons import convex_parts, convex_rows, neighbours, outlines, rows_of, rows_taken, starts_of
@@ -377,7 +377,7 @@ class Parts(Volumes):
 
     def __init__(self, parts: Volumes, starts: object) -> None:
         if not isinstance(parts, Volumes):
-            raise InputError(f"parts: expected volumes of one kind, got {type(parts).__name__}")
+            raise InputError(f"parts: expected volumes of one kind, got {kind_of(parts)}")
         self.parts, self.d = parts, parts.d
         self.starts = _checked_starts(starts, len(parts))
 

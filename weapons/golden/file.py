@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hitplanes.planes.common.checks import Bools, Image, InputError, array_of, choice, integer, printable
+from hitplanes.planes.common.checks import Bools, Image, InputError, array_of, choice, integer, kind_of, printable
 from hitplanes.planes.common.limits import POSITION_MAX
 from hitplanes.planes.common.tables import Text
 from hitplanes.planes.files.png import read_png, write_bytes, write_png, write_text
@@ -148,7 +148,7 @@ class Unlike:
 def check_present(hits: object) -> Hits:
     """Check that hits are Hits, and that their scene is as it was; an InputError names what has changed."""
     if not isinstance(hits, Hits):
-        raise InputError(f"hits: expected Hits, as fire returns them, got {type(hits).__name__}")
+        raise InputError(f"hits: expected Hits, as fire returns them, got {kind_of(hits)}")
     scene = hits.scene
     if hits.version == scene.version:
         return hits
@@ -295,7 +295,7 @@ def _scene_planes(scene: Scene) -> tuple[dict[str, Plane], tuple[int, int], str 
 def _own_planes(planes: object) -> dict[str, Plane]:
     """Check and copy the user's planes."""
     if not isinstance(planes, Mapping):
-        raise InputError(f"planes: expected arrays by name, got {type(planes).__name__}")
+        raise InputError(f"planes: expected arrays by name, got {kind_of(planes)}")
     kept = {}
     for key, value in planes.items():
         name = Text().check("planes", key)

@@ -525,7 +525,7 @@ def weapon_from_json(data: object, name: str = "weapon", kinds: tuple[type, ...]
 def weapons_of(scene: Scene) -> dict[str, Weapon]:
     """Weapons of a scene's file, by name."""
     if not isinstance(scene, Scene):
-        raise InputError(f"scene: expected a Scene, got {type(scene).__name__}")
+        raise InputError(f"scene: expected a Scene, got {kind_of(scene)}")
     weapons = typed("weapons", scene.weapons, dict)
     return {name: weapon_from_json(data, f"weapons.{name}") for name, data in weapons.items()}
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar, Unpack, cast, overload
 import numpy as np
 
 from hitplanes.planes.common.backend import LruCache, kernels_of
-from hitplanes.planes.common.checks import InputError
+from hitplanes.planes.common.checks import InputError, kind_of
 from hitplanes.planes.common.limits import ALL, HALF, POSITION_MAX, SUB
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
@@ -316,7 +316,7 @@ def prepare(
         Naming the argument.
     """
     if not isinstance(scene, Scene):
-        raise InputError(f"scene: expected a Scene, got {type(scene).__name__}")
+        raise InputError(f"scene: expected a Scene, got {kind_of(scene)}")
     kept = _filter_of(scene, accept, blocked_by, exclude, seed)
     parts = ray_parts_of(weapon)
     if parts is not None:

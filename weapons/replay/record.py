@@ -27,7 +27,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from hitplanes.planes.common.checks import InputError, path_of, printable, shown, within
+from hitplanes.planes.common.checks import InputError, kind_of, path_of, printable, shown, within
 from hitplanes.planes.common.limits import ALL, POSITION_MAX, SEED_MAX, SUB, TEXT_BYTES_MAX, TICK_MAX
 from hitplanes.planes.common.tables import (
     Const,
@@ -468,7 +468,7 @@ def _scene_at(scene: Any, tick: float | None) -> Scene:
         return scene.at(tick)
     found = scene(tick) if callable(scene) else scene
     if not isinstance(found, Scene):
-        raise InputError(f"scene: expected a Scene, got {type(found).__name__}")
+        raise InputError(f"scene: expected a Scene, got {kind_of(found)}")
     return found
 
 

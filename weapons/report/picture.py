@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from hitplanes.planes.common.checks import Bools, Image, InputError, flag, shown
+from hitplanes.planes.common.checks import Bools, Image, InputError, flag, kind_of, shown
 from hitplanes.planes.common.limits import VIEW_MAX
 from hitplanes.planes.common.tables import Const
 from hitplanes.planes.grid.spans import Box
@@ -92,7 +92,7 @@ def _check(report: object, scene: object) -> None:
         raise InputError(f"report: expected one, as report_of makes it, got {shown(report)}")
     Const(FORMAT).check("report: format", report.get("format"))
     if not isinstance(scene, Scene):
-        raise InputError(f"scene: expected a Scene, got {type(scene).__name__}")
+        raise InputError(f"scene: expected a Scene, got {kind_of(scene)}")
 
 
 def _shots(world: World, report: Mapping[str, Any], scene: Scene) -> list[Text]:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from hitplanes.planes.bits.span_walk import OF_PATTERNS, Verdict
-from hitplanes.planes.common.checks import InputError, Ints, listed
+from hitplanes.planes.common.checks import InputError, Ints, kind_of, listed
 from hitplanes.planes.common.limits import ALL, CHUNK_SAMPLES, SUB, VIEW_MAX
 from hitplanes.planes.common.tables import Text
 from hitplanes.planes.grid.fixed_point import pixel
@@ -160,7 +160,7 @@ def present_of(then: Scene, now: Scene, fired: Sequence[Hits], view_xyxy: Box) -
     - "shots": what each shot hits now; null if it would start in an item and its weapon forbids that
     """
     if not isinstance(now, Scene):
-        raise InputError(f"now: expected a Scene, got {type(now).__name__}")
+        raise InputError(f"now: expected a Scene, got {kind_of(now)}")
     was, is_now = (set(scene.items.stack().ids.tolist()) for scene in (then, now))
     return {
         "tick": then.tick if isinstance(then, PastScene) else None,
@@ -309,14 +309,14 @@ def _boxes(hits: Hits) -> Ints:
 
 def _checked(scene: Scene, fired: object) -> list[Hits]:
     if not isinstance(scene, Scene):
-        raise InputError(f"scene: expected a Scene, got {type(scene).__name__}")
+        raise InputError(f"scene: expected a Scene, got {kind_of(scene)}")
     Text().check("scene.name", scene.name)
     if isinstance(fired, Hits):
         raise InputError("fired: expected a list of Hits, got Hits alone")
     batches: list[Hits] = listed("fired", fired, "a list of Hits")
     for row, hits in enumerate(batches):
         if not isinstance(hits, Hits):
-            raise InputError(f"fired[{row}]: expected Hits, got {type(hits).__name__}")
+            raise InputError(f"fired[{row}]: expected Hits, got {kind_of(hits)}")
         if not hits.one_scene:
             raise InputError(f"fired[{row}]: expected shots at one tick, got several: fire them at history.at(tick)")
         if hits.scene is not scene:
