@@ -94,8 +94,10 @@ SCENES: dict[str, tuple[Any, str]] = {
     "duplicate key inside": (
         spelled(GUN, '{"kind": "disc", "kind": "point"}'), "key: expected each .*got 'kind' again"),
     "duplicate key, escaped": (spelled(GUN, '{"kind": 1, "\\u006bind": 2}'), "key: expected each .*got 'kind' again"),
-    "NaN": (spelled(f"{DUCK}.position_xy", "[NaN, 1]"), "number: expected a finite number, got NaN"),
-    "Infinity": (spelled(f"{SHOT}.at", "[-Infinity, 1]"), "number: expected a finite number, got -Infinity"),
+    "NaN": (
+        spelled(f"{DUCK}.position_xy", "[NaN, 1]"), r"objects: hittable\[0\]: position_xy\[0\]: .*finite number, got NaN"),
+    "Infinity": (
+        spelled(f"{SHOT}.at", "[-Infinity, 1]"), r"shots\[0\]: at\[0\]: expected a finite number, got -Infinity"),
     "1e999": (
         spelled(f"{DUCK}.position_xy", "[1e999, 1]"), r"hittable\[0\]: position_xy\[0\]: .*finite number, got inf"),
     "1e999 in a shot": (

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import PurePosixPath
 from typing import Any, Protocol
@@ -287,17 +287,35 @@ class Ref:
 
 
 def json_of(text: str) -> Any:
-    """Parse JSON; keys that come twice and numbers that are not finite are refused."""
+    """Parse JSON; keys that come twice, NaN and Infinity are refused."""
+    odd: list[str] = []
 
     def number(text: str) -> float:
-        raise InputError(f"number: expected a finite number, got {text}")
+        odd.append(text)
+        return math.nan
 
     try:
-        return json.loads(text, object_pairs_hook=distinct_keys, parse_constant=number)
+        value = json.loads(text, object_pairs_hook=distinct_keys, parse_constant=number)
+        place = next(_nans(value, ""), "") if odd else ""
     except InputError:
         raise
     except (ValueError, RecursionError) as error:
         raise InputError(f"expected JSON in UTF-8: {error}") from error
+    if odd:
+        raise InputError(f"{place or 'number'}: expected a finite number, got {odd[0]}")
+    return value
+
+
+def _nans(value: Any, place: str) -> Iterator[str]:
+    """Places of numbers that are not finite in JSON, as errors name them."""
+    if isinstance(value, float) and math.isnan(value):
+        yield place
+    elif isinstance(value, list):
+        for i, part in enumerate(value):
+            yield from _nans(part, f"{place}[{i}]")
+    elif isinstance(value, dict):
+        for key, part in value.items():
+            yield from _nans(part, f"{place}: {key:.60}" if place else f"{key:.60}")
 
 
 def distinct_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -36,8 +36,8 @@ class HitRow(NamedTuple):
     """One object hit by one round of one shot.
 
     `shot` counts within the batch; `samples` counts pixels of all pellets, `pixels` each pixel once; `weight` adds
-    whole weights (65,535 a sample at full strength); `pellets` counts those that hit; `first_xy` is the hit pixel
-    nearest to the round's pixel and `distance2` its squared distance, px^2.
+    whole weights (65,535 a sample at full strength, of rays a pass); `pellets` counts those that hit; `first_xy` is the
+    hit pixel nearest to the round's pixel and `distance2` its squared distance, px^2.
     """
 
     shot: int
@@ -160,7 +160,9 @@ class Hits:
     object = _column("object", "Id of the object that was hit.")
     samples = _column("samples", "Hit pixels of all pellets; of rays hit cells.")
     pixels = _column("pixels", "Hit pixels, each once.")
-    weight = _column("weight", "Sum of whole weights: 65,535 a sample at full strength.")
+    weight = _column(
+        "weight", "Sum of whole weights: 65,535 a sample at full strength; of rays 65,535 a pass, at its first cell."
+    )
     pellets = _column("pellets", "Pellets that hit.")
     first_xy = _column("first_xy", "Hit pixel (n, 2) nearest to the round's pixel; of rays the first cell.")
     distance2 = _column("distance2", "Squared distance of `first_xy` from the round's pixel, px^2.")
