@@ -95,7 +95,7 @@ SCENES: dict[str, tuple[Any, str]] = {
         spelled(GUN, '{"kind": "disc", "kind": "point"}'), "key: expected each .*got 'kind' again"),
     "duplicate key, escaped": (spelled(GUN, '{"kind": 1, "\\u006bind": 2}'), "key: expected each .*got 'kind' again"),
     "NaN": (
-        spelled(f"{DUCK}.position_xy", "[NaN, 1]"), r"objects: hittable\[0\]: position_xy\[0\]: .*finite number, got NaN"),
+        spelled(f"{DUCK}.position_xy", "[NaN, 1]"), r"objects: hittable\[0\]: position_xy\[0\]: .*number, got NaN"),
     "Infinity": (
         spelled(f"{SHOT}.at", "[-Infinity, 1]"), r"shots\[0\]: at\[0\]: expected a finite number, got -Infinity"),
     "1e999": (

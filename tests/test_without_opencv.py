@@ -21,6 +21,7 @@ from hitplanes import (
     Disc, History, Laser, Pistol, Projectile, Rifle, Scene, ShotRecord, Spread, Sprite, weapons_of, fire, load_scene,
     prepare, replay, report_of,
 )
+from hitplanes.planes.volumes.fit import concave
 
 mask = np.ones((9, 9), np.bool_)
 image = np.full((9, 9, 4), 255, np.uint8)
@@ -36,6 +37,11 @@ for weapon in (Disc(9), Spread(Disc(2), 6, 9), Pistol(150), Rifle(150, budget=20
     assert [scene.name_of(row.object) for row in hits][:1] == ["duck"], weapon
     assert hits.margins(0) is not None and hits.samples_at(0) is not None and hits.why_not(0) is not None
     assert report_of(scene, [hits])["shots"]
+for kind in ("box", "circle", "oriented box", "4 boxes", "polygon"):
+    assert len(scene.volumes(scene.ids(), kind)) == len(scene.ids())
+parts = np.zeros((20, 20), np.bool_)
+parts[2:9, 3:9] = parts[12:17, 11:18] = True
+assert len(concave(parts, 0.5)) > 4
 ready = prepare(scene, Disc(9))
 assert len(ready.fire((62, 62))) == len(fire(scene, Disc(9), (62, 62)))
 fire(scene, Disc(6), np.random.default_rng(1).uniform(0, 200, (3000, 2)))

@@ -340,8 +340,8 @@ class Bounds:
 
 def volumes_of(items: Items, name: str, rows: Ints) -> Volumes:
     """Bounding volumes of items in the world, one row each; see `Scene.volumes`."""
-    counted = boxes_in("kind", name) is not None
-    choice("kind", "4 boxes" if counted else name, ("box", "circle", "oriented box", "4 boxes", "polygon"))
+    k = boxes_in("kind", name)
+    kind = choice("kind", "4 boxes" if k else name, ("box", "circle", "oriented box", "4 boxes", "polygon"))
     for item in items.id[rows[items.size_wh[rows, 0] == 0]].tolist():
         raise InputError(f"ids: expected objects with a pixel, got {item}, whose mask is empty")
     if name == "box":
@@ -349,7 +349,7 @@ def volumes_of(items: Items, name: str, rows: Ints) -> Volumes:
         return Aabbs(low - 0.5, high + 0.5)
     if not len(rows):
         return Circles(np.zeros((0, 2)), 0.0)
-    volumes, of = items.bounding(name, rows)
+    volumes, of = items.bounding(f"{k} boxes" if k else kind, rows)
     return shifted(volumes.take(of), pixel(items.position_256[rows] - items.pivot_256[rows]))
 
 

@@ -25,8 +25,7 @@ import numpy.typing as npt
 
 from ..common.checks import Bools, Floats, Ints
 from ..common.limits import BOXES_MAX, OUTLINE_CORNERS, OUTLINE_PIXELS, SUB
-from ..files.png import cv2
-from ..grid.spans import Box
+from ..grid.spans import Box, Spans
 from .polygons import Point, extents, turn
 
 
@@ -167,10 +166,8 @@ def _blocks(mask: Bools, block: int) -> Bools:
 def _joined(mask: Bools) -> Bools:
     """The mask as one part that is connected by sides."""
     mask = _without_crossings(mask)
-    count, labels = cv2.connectedComponents(mask.astype(np.uint8), connectivity=4)
-    if count == 2:  # the background and one part
-        return mask
-    return _without_crossings(_bridged(labels.astype(np.int64) - 1, count - 1))
+    labels, parts = _labels(mask)
+    return mask if parts == 1 else _without_crossings(_bridged(labels, parts))
 
 
 def _without_crossings(mask: Bools) -> Bools:
@@ -190,6 +187,23 @@ def _root(parents: list[int], i: int) -> int:
         parents[i] = parents[parents[i]]
         i = parents[i]
     return i
+
+
+def _labels(mask: Bools) -> tuple[Ints, int]:
+    """Label the parts that are connected by sides: labels (h, w), -1 off the mask, and their number."""
+    runs = Spans.from_mask(mask)
+    width = mask.shape[1] + 1
+    first, last = runs.y * width + runs.x_first, runs.y * width + runs.x_last
+    begin, end = np.searchsorted(last, first - width), np.searchsorted(first, last - width, side="right")
+    parents = list(range(len(runs)))
+    for i, (low, high) in enumerate(zip(begin.tolist(), end.tolist(), strict=True)):
+        for above in range(low, high):
+            parents[_root(parents, above)] = _root(parents, i)
+    roots = np.array([_root(parents, i) for i in range(len(runs))])
+    names, number = np.unique(roots, return_inverse=True)
+    labels = np.full(mask.shape, -1, np.int64)
+    labels[mask] = np.repeat(number, runs.lengths)
+    return labels, len(names)
 
 
 def _bridged(labels: Ints, parts: int) -> Bools:

@@ -327,8 +327,9 @@ def _request_of(scene: Scene, weapon: Weapon, shots: Shots, how: How, plan: Plan
     looked_up = filtered or how[2] == "spans" or not traits.fits  # else boxes are compared as samples are counted
     candidates = chosen_candidates(*how[:2], scene, stack, placements if looked_up else 0)
     return Request(
-        stack, scene.bounds, traits.pierces, candidates, plan, blockers, scene, weapon, shots, traits, view,
-        may_refuse(stack, shots), filtered, placements, stack.covers,
+        stack, scene.bounds, traits.pierces, candidates, plan, blockers, scene=scene, weapon=weapon, shots=shots,
+        traits=traits, view=view, choosy=may_refuse(stack, shots), filtered=filtered, placements=placements,
+        covers=stack.covers,
     )  # fmt: skip
 
 

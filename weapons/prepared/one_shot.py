@@ -136,8 +136,8 @@ class Filter:
 class Present:
     """Snapshot of a scene at one version, with the weapon and its filter; the roles are of items that decide no hit.
 
-    `near` is where patterns look up what is near them, a `PositionCache`; or what a px of each item (M,) costs, for a
-    ray with a budget.
+    `near` is where patterns look up what is near them: a `PositionCache`. `cost` (M,) is what a px of each item takes
+    from the budget of a ray that has one.
     """
 
     scene: Scene
@@ -148,6 +148,7 @@ class Present:
     filter: Filter
     imagery: Sequence[Role]
     near: Any = None
+    cost: Ints | None = None
 
 
 class OneShot(Hits, list[HitRow]):

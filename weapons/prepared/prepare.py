@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar, Unpack, cast, overload
 import numpy as np
 
 from hitplanes.planes.common.backend import LruCache, kernels_of
-from hitplanes.planes.common.checks import InputError, kind_of
+from hitplanes.planes.common.checks import InputError, Ints, kind_of
 from hitplanes.planes.common.limits import ALL, HALF, POSITION_MAX, SUB
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
@@ -109,9 +109,10 @@ class Ready(Generic[AnyHits]):
     def _read(self, version: int, stack: Stack) -> None:
         """Read the scene at a version."""
 
-    def _snapshot(self, version: int, stack: Stack, near: Any = None) -> Present:
+    def _snapshot(self, version: int, stack: Stack, near: Any = None, cost: Ints | None = None) -> Present:
         scene = self.scene
-        return Present(scene, version, stack, scene.bounds, self.weapon, self._filter, scene.items.imagery(), near)
+        weapon, imagery = self.weapon, scene.items.imagery()
+        return Present(scene, version, stack, scene.bounds, weapon, self._filter, imagery, near, cost)
 
 
 class AimCache:

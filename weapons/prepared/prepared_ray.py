@@ -64,7 +64,8 @@ class OneRay(OneShot, RayHits):
         cast = stack, bounds, lines, ray.hits_most, filters
         found = kernels_of(raycast).hits_and_ends(*cast) or raycast.hits_and_ends(*cast)
         walk = raycast.walk_of(rays, ray, stack, bounds, found)
-        return walk if ray.budget_256 is None else raycast.spent(walk, self._present.near, ray.budget_256)
+        cost = self._present.cost
+        return walk if cost is None or ray.budget_256 is None else raycast.spent(walk, cost, ray.budget_256)
 
     @cached_attribute
     def _later(self) -> Later:
@@ -112,7 +113,7 @@ class ReadyRay(Ready[RayHits]):
         hits._present, hits._at, hits._arguments = self._present, place, (angle, target, number)
         found = followed[1]
         if self._budget_256 and found:
-            found = self._spent(start, step, self._budget_256, followed)
+            found = self._before_spent(start, step, self._budget_256, followed)
         for rank, count, x, y, entry in found:
             column, row = x - ((start[0] + HALF) >> 8), y - ((start[1] + HALF) >> 8)
             weight = WEIGHT_FULL if self._fades is None else self._weight(step, entry)
@@ -125,17 +126,18 @@ class ReadyRay(Ready[RayHits]):
         starts_inside = self._ray.inside != "hit" and (end == 0 or (found and found[0][ENTRY] == 0))
         return bool(starts_inside) or self._budget_256 == 0
 
-    def _spent(
+    def _before_spent(
         self, start: tuple[int, int], step: tuple[int, int], budget_256: int, followed: Followed
     ) -> list[list[int]]:
         """What a ray hits before its budget is used up, of what it hits without one."""
-        start_256, ends = np.array([start]), endless(1)
-        ends.time[0], rows = followed[0], np.array(followed[1]).T
-        (left, top), (rank, count, x, y, entry) = pixel(start_256)[0].tolist(), rows
-        rays = Rays(start_256, np.array([step]), pixel(start_256), *np.zeros((3, 1), np.int64))
+        start_256, only, ends, cost = np.array([start]), np.zeros(1, np.int64), endless(1), self._present.cost
+        assert cost is not None  # its weapon has a budget
+        ends.time[0] = followed[0]
+        rays = Rays(start_256, np.array([step]), pixel(start_256), shot=only, round=only, pellet=only)
+        (left, top), (rank, count, x, y, entry) = rays.origin_xy[0].tolist(), np.array(followed[1]).T
         hit = Touches(np.zeros_like(rank), rank, count, x - left, y - top, entry)
         walk = Walk(rays, lines_of(rays, self._ray), hit, ends, self._stack, self._present.bounds, None)
-        hit = raycast.spent(walk, self._present.near, budget_256).hit
+        hit = raycast.spent(walk, cost, budget_256).hit
         found: list[list[int]] = np.stack([hit.rank, hit.count, hit.x + left, hit.y + top, hit.entry], axis=1).tolist()
         return found
 
@@ -183,4 +185,4 @@ class ReadyRay(Ready[RayHits]):
             self._ids = stack.ids.data
         self._follows = self._unsettled
         cost = None if self._budget_256 is None else self.scene.items.cost[stack.rows]
-        self._present = self._snapshot(version, stack, cost)
+        self._present = self._snapshot(version, stack, cost=cost)

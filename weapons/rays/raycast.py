@@ -129,14 +129,14 @@ def spent(walk: Walk, cost: Ints, budget_256: int) -> Walk:
     many = np.flatnonzero(looked & (np.bincount(ray, minlength=len(most))[ray] > 2 * FEW))
     if len(many):
         few = many[many - np.searchsorted(ray, ray[many]) < FEW]
-        looked &= hit.entry <= _used_up(walk, few, cost, budget_256)[0].time[ray]
+        looked &= hit.entry <= _ends_by_budget(walk, few, cost, budget_256)[0].time[ray]
     pairs, walked = np.flatnonzero(looked), np.zeros(len(ray), np.int64)
-    ends, walked[pairs] = _used_up(walk, pairs, cost, budget_256)
+    ends, walked[pairs] = _ends_by_budget(walk, pairs, cost, budget_256)
     count = np.where(ends.reason[ray] == Reason.BUDGET, walked, hit.count)
     return replace(walk, hit=replace(hit, count=count).take(np.flatnonzero(count)), ends=ends)
 
 
-def _used_up(walk: Walk, pairs: Ints, cost: Ints, budget_256: int) -> tuple[Terminations, Ints]:
+def _ends_by_budget(walk: Walk, pairs: Ints, cost: Ints, budget_256: int) -> tuple[Terminations, Ints]:
     """Ends of rays by a budget that some of their hits (n,) take from, and the cells of these that are walked."""
     ends, met = walk.ends.take(np.arange(len(walk.rays))), replace(walk, hit=walk.hit.take(pairs)).contacts[0]
     end_at_budget(ends, met.take(np.flatnonzero(cost[met.rank] > 0)), walk.lines, cost, budget_256)
