@@ -99,8 +99,9 @@ def test_every_way_agrees_with_one_segment_a_pixel(part: int) -> None:
 @pytest.mark.usefixtures("jit")
 @pytest.mark.parametrize("part", some_of(range(4), 2))
 def test_large_masks_are_covered_near_the_shots(monkeypatch: pytest.MonkeyPatch, part: int) -> None:
-    """Masks of a few pixels are large here: each has many blocks, of which most are far from a shot."""
+    """Masks of a few pixels are large here: each has many blocks, of which most are far from a shot, in many pieces."""
     monkeypatch.setattr(shadows, "BLOCK", 3)
+    monkeypatch.setattr(shadows, "CHUNK_SAMPLES", 40)
     check(range(400 + 15 * part, 400 + 15 * (part + 1)))
 
 

@@ -27,7 +27,8 @@ import numpy as np
 
 from ..common.backend import LruCache, kernels_of
 from ..common.checks import Bools, Floats, Ints
-from ..grid.spans import Box, begins, clipped, each_pixel, merged_runs, ragged, rectangles, sorted_once
+from ..common.limits import CHUNK_SAMPLES
+from ..grid.spans import Box, begins, clipped, each_pixel, merged_runs, pieces, ragged, rectangles, sorted_once
 from . import cells
 from .bit_rows import WORD, Words
 from .span_walk import Runs
@@ -321,18 +322,21 @@ def _hidden(
         pair, rects, begun = _begun_apart(pair, rects)
         found = [_hidden_after_exit(runs, placement[k], k, x[k], y[k], inside) for k, inside in begun]
     begin, end = (runs.placement.searchsorted(placement, side=side) for side in ("left", "right"))
-    rect, place = ragged((end - begin)[pair])
-    own = pair[rect]
-    run = begin[own] + place
-    first, last, bare_first, bare_last = shadow(rects[rect], runs.y[run] - y[own])
-    bare = bare_first <= bare_last
-    before = first, np.where(bare, bare_first - 1, last)
-    for part in (before, (np.where(bare, bare_last + 1, np.inf), last)):
-        low = np.maximum(part[0], runs.x_first[run] - x[own])
-        high = np.minimum(part[1], runs.x_last[run] - x[own])
-        kept = (low <= high).nonzero()[0]
-        shift = x[own[kept]]
-        found.append((own[kept], run[kept], low[kept].astype(np.int64) + shift, high[kept].astype(np.int64) + shift))
+    rows = (end - begin)[pair]
+    for piece in pieces(rows, CHUNK_SAMPLES):
+        rect, place = ragged(rows[piece])
+        own = pair[piece][rect]
+        run = begin[own] + place
+        first, last, bare_first, bare_last = shadow(rects[piece][rect], runs.y[run] - y[own])
+        bare = bare_first <= bare_last
+        before = first, np.where(bare, bare_first - 1, last)
+        for part in (before, (np.where(bare, bare_last + 1, np.inf), last)):
+            low = np.maximum(part[0], runs.x_first[run] - x[own])
+            high = np.minimum(part[1], runs.x_last[run] - x[own])
+            kept = (low <= high).nonzero()[0]
+            shift = x[own[kept]]
+            left, right = (side[kept].astype(np.int64) + shift for side in (low, high))
+            found.append((own[kept], run[kept], left, right))
     columns = [np.concatenate(column) for column in zip(*found, strict=True)]
     return columns[0], columns[1], columns[2], columns[3]
 
