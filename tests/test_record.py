@@ -487,7 +487,7 @@ LINES: dict[str, tuple[Callable[[bytes], bytes], str]] = {
     "zeros": (lambda line: b"\0" * 60 + line[60:], "expected JSON in UTF-8"),
     "no UTF-8": (lambda line: line.replace(b'"scene":"', b'"scene":"\xff'), "line 3"),
     "twice a key": (lambda line: line.replace(b"{", b'{"seed":1,', 1), "key: expected each key once, got 'seed' again"),
-    "NaN": (lambda line: line.replace(b'"seed":0', b'"seed":NaN'), "number: expected a finite number, got NaN"),
+    "NaN": (lambda line: line.replace(b'"seed":0', b'"seed":NaN'), "seed: expected a finite number, got NaN"),
     "empty": (lambda line: b"\n", "expected JSON in UTF-8"),
     "no object": (lambda line: b"[]\n", "shot: expected an object, got"),
     "deep": (lambda line: b"[" * 10**5 + b"\n", "expected JSON in UTF-8: maximum recursion depth"),
