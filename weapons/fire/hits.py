@@ -69,7 +69,7 @@ class Rows(ShotColumns):
 
     def __init__(self, *columns: Ints | None, **named: Ints | None) -> None:
         """Columns in the order of a `HitRow`, or by their names; those of DEFAULTS may be missing, or None."""
-        given = dict(zip(HitRow._fields, columns, strict=False)) | named
+        given = dict(zip(HitRow._fields[: len(columns)], columns, strict=True)) | named
         vars(self).update({name: column for name, column in given.items() if column is not None})
 
     def __getattr__(self, name: str) -> Any:

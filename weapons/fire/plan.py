@@ -43,7 +43,7 @@ class Stage:
         return record if self.pairs is None else {**record, "pairs": list(self.pairs)}
 
     def add(self, other: Stage) -> None:
-        """Add the numbers of the same stage, which ran again; the first reason is kept."""
+        """Add the numbers of the same stage, which ran again; the first reason that was given is kept."""
         self.why = self.why or other.why
         self.bytes_made += other.bytes_made
         self.ns += other.ns

@@ -18,7 +18,7 @@ from hitplanes.planes.bits.span_walk import OF_PATTERNS, Verdict
 from hitplanes.planes.common.backend import kernels_of
 from hitplanes.planes.common.checks import Ints
 
-from ..kinds.placements import placements_for
+from ..kinds.placements import Placements, placements_for
 from .areas import PLACEMENTS_AT_ONCE, Request, by_tiles, parts_of_batch, placed_of
 from .hits import Rows
 from .plan import Plan
@@ -41,8 +41,8 @@ def verdicts_of(request: Request, rows: Rows, way: str) -> Ints:
     first = replace(request, candidates=Candidates(items, stack), filtered=False, plan=Plan())  # not that of the call
     if way == "spans" or gone or request.blockers is not None or not request.traits.fits:
         return _by_spans(first)
-    first.pierce, first.view = False, request.view and request.view._replace(pierce=False)
-    fired, inside = _fired_and_inside(first)
+    fired, inside, placed = _fired_and_inside(first)
+    first = replace(first, pierce=False, view=request.view and request.view._replace(pierce=False), placed=placed)
     hit = _samples(_rows(first) if request.pierce else rows, len(fired))
     occluded = np.zeros_like(hit)
     if stack.has_occluders:
@@ -71,8 +71,8 @@ def _rows(request: Request) -> Rows:
     return Rows.joined(chosen_way("auto", request)[0].engine(request))
 
 
-def _fired_and_inside(request: Request) -> tuple[Ints, Ints]:
-    """Samples (N,) of shots, and those within the bounds; the request keeps the placements, unless they are many."""
+def _fired_and_inside(request: Request) -> tuple[Ints, Ints, Placements | None]:
+    """Samples (N,) of shots, those within the bounds, and the placements, unless they are many."""
     bounds, each = request.bounds, request.traits.placements
     fired, within = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
     placements = None
@@ -83,8 +83,7 @@ def _fired_and_inside(request: Request) -> tuple[Ints, Ints]:
             inside = kernels_of(bit_rows).pixels_within(placed_of(placements), table.bits, table.count, bounds)
         fired.append(count if each == 1 else count.reshape(-1, each).sum(axis=1))
         within.append(inside if each == 1 else inside.reshape(-1, each).sum(axis=1))
-    request.placed = placements if len(fired) == 2 else None
-    return np.concatenate(fired), np.concatenate(within)
+    return np.concatenate(fired), np.concatenate(within), placements if len(fired) == 2 else None
 
 
 def _by_spans(request: Request) -> Ints:

@@ -130,7 +130,7 @@ class ReadyRay(Ready[RayHits]):
         self, start: tuple[int, int], step: tuple[int, int], budget_256: int, followed: Followed
     ) -> list[list[int]]:
         """What a ray hits before its budget is used up, of what it hits without one."""
-        start_256, only, ends, cost = np.array([start]), np.zeros(1, np.int64), endless(1), self._present.cost
+        cost, only, start_256, ends = self._present.cost, np.zeros(1, np.int64), np.array([start]), endless(1)
         assert cost is not None  # its weapon has a budget
         ends.time[0] = followed[0]
         rays = Rays(start_256, np.array([step]), pixel(start_256), shot=only, round=only, pellet=only)

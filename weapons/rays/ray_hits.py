@@ -129,7 +129,6 @@ class Walk:
     """Contacts with objects and occluders, also beyond the ends, and the line of each pair, relative to the motion of
     its item; None if items do not move, so that the contacts can be found again."""
 
-    @property
     def contacts(self) -> tuple[Contacts, Lines]:
         """Contacts with the objects that were hit, at least, and the line of each pair."""
         if self.traced:
@@ -140,14 +139,14 @@ class Walk:
 
     def _walked(self) -> tuple[Contacts, Ints, Lines]:
         """Walked cells of objects, in the order of the passes; their pairs; and the lines of all pairs."""
-        met, lines = self.contacts
+        met, lines = self.contacts()
         walked, chosen = walked_of(met, self.ends, self.stack)
         return walked, chosen, lines
 
     @property
     def walked(self) -> Contacts:
         """Walked cells of objects, in any order."""
-        return cells_hit(self.contacts[0], self.ends, self.stack)
+        return cells_hit(self.contacts()[0], self.ends, self.stack)
 
     @cached_property
     def summed(self) -> Summed:

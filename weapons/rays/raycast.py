@@ -138,7 +138,7 @@ def spent(walk: Walk, cost: Ints, budget_256: int) -> Walk:
 
 def _ends_by_budget(walk: Walk, pairs: Ints, cost: Ints, budget_256: int) -> tuple[Terminations, Ints]:
     """Ends of rays by a budget that some of their hits (n,) take from, and the cells of these that are walked."""
-    ends, met = walk.ends.take(np.arange(len(walk.rays))), replace(walk, hit=walk.hit.take(pairs)).contacts[0]
+    ends, met = walk.ends.take(np.arange(len(walk.rays))), replace(walk, hit=walk.hit.take(pairs)).contacts()[0]
     end_at_budget(ends, met.take(np.flatnonzero(cost[met.rank] > 0)), walk.lines, cost, budget_256)
     return ends, np.bincount(met.pair[ends.walked(met)], minlength=len(pairs))
 
