@@ -121,11 +121,16 @@ class Stack:
         return np.concatenate([[0], np.cumsum(self.width * height)])
 
     @cached_property
+    def mean_wh(self) -> Floats:
+        """Mean width and height of the items, px."""
+        return np.asarray((self.box_xyxy[:, 2:] - self.box_xyxy[:, :2]).mean(axis=0) + 1)
+
+    @cached_property
     def sizes(self) -> tuple[Floats, Floats]:
         """Mean width and height of the items, and width and height of the box around all of them, px."""
-        x, y, x_max, y_max = np.ascontiguousarray(self.box_xyxy.T)
-        mean = np.array([(x_max - x).mean(), (y_max - y).mean()]) + 1
-        return mean, np.array([x_max.max() - x.min(), y_max.max() - y.min()], np.float64) + 1
+        sides = np.ascontiguousarray(self.box_xyxy.T)
+        around = np.maximum.reduce(sides, axis=1)[2:] - np.minimum.reduce(sides, axis=1)[:2]
+        return self.mean_wh, around + 1.0
 
     def mask(self, rank: int) -> Bools:
         """Mask (h, w) of the item at a rank, 0 in front."""
@@ -136,7 +141,9 @@ class Stack:
 
 def _is_there(boxes: Ints | Box) -> bool:
     """Whether any of some boxes (n, 4), or a single box, holds a pixel."""
-    return boxes[0] <= boxes[2] if isinstance(boxes, tuple) else bool((boxes[:, 0] <= boxes[:, 2]).any())
+    if isinstance(boxes, tuple):
+        return boxes[0] <= boxes[2]
+    return bool(len(boxes)) and (boxes.item(0, 0) <= boxes.item(0, 2) or bool((boxes[:, 0] <= boxes[:, 2]).any()))
 
 
 NOWHERE = (0, 0, -1, -1)

@@ -321,14 +321,12 @@ def chosen_candidates(prefilter: object, broadphase: object, scene: Scene, stack
     InputError
         If a name is unknown, or a broad phase is asked for without a pre-filter.
     """
-    wanted = prefilter_of(prefilter)
+    wanted = BOX if prefilter == "auto" else prefilter_of(prefilter)
     structure = choice("broadphase", broadphase, BROADPHASES)
     if wanted.name == "none":
         if structure not in ("auto", "none"):
             raise InputError(f"broadphase: expected 'none' without a pre-filter, got {structure!r}")
         return Candidates(scene.items, stack, wanted, None, "none: every item", "no box is compared")
-    if wanted.name == "auto":
-        wanted = BOX
     text = "box" if wanted == BOX else f"box, then {wanted.name}"
     if structure == "none":
         return Candidates(scene.items, stack, wanted, None, text)
