@@ -313,7 +313,8 @@ def match(
 ):  # fmt: skip
     """Write the rows of rounds `turn` .. `end` - 1 to columns `out`, from row `count` on.
 
-    The arguments are the columns of `Placed`, `PatternBits`, `OrderedTiles`, `Cells` and `Rule`.
+    The arguments are the columns of `Placed`, `PatternBits`, `OrderedTiles`, `Cells` and `Rule`. It is one long function
+    because numba counts the references of each array at each call: in parts, a placement took up to five times as long.
 
     Returns
     -------
