@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import errno
 import importlib
 import json
@@ -476,3 +477,59 @@ def test_a_warm_up_needs_numba(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("hitplanes.planes.common.backend.find_spec", lambda name: None)
     with pytest.raises(InputError, match=r"^jit: expected numba, .* got no such module$"):
         warm_up()
+
+
+def helpers_of(source: str) -> dict[str, tuple[ast.FunctionDef, bool]]:
+    """Helpers of kernels in a source, by name, each with whether it says that it allocates."""
+    functions = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.FunctionDef)]
+    by = {
+        node: [ast.unparse(of) for of in node.decorator_list if ast.unparse(of).startswith("helper(")]
+        for node in functions
+    }
+    return {node.name: (node, "allocates=True" in of[0]) for node, of in by.items() if of}
+
+
+def arrays_in(function: ast.FunctionDef) -> set[str]:
+    """Names of a function that are arrays: they are read at an index and are no tuple, or are a slice."""
+    nodes = list(ast.walk(function))
+    read = {ast.unparse(node.value) for node in nodes if isinstance(node, ast.Subscript)}
+    given = [(ast.unparse(node.targets[0]), node.value) for node in nodes if isinstance(node, ast.Assign)]
+    tuples = {name for name, value in given if isinstance(value, ast.Tuple)}
+    return read - tuples | {name for name, value in given if is_slice(value)}
+
+
+def is_slice(node: ast.AST) -> bool:
+    return isinstance(node, ast.Subscript) and any(isinstance(part, ast.Slice) for part in ast.walk(node.slice))
+
+
+def unsafe(source: str, allocating: set[str]) -> list[str]:
+    """Helpers without counts of references that return an array, or call one that returns a new array."""
+    found = []
+    for name, (function, allocates) in helpers_of(source).items():
+        returns = [node.value for node in ast.walk(function) if isinstance(node, ast.Return) and node.value]
+        parts = [part for value in returns for part in (value.elts if isinstance(value, ast.Tuple) else [value])]
+        calls = {ast.unparse(node.func) for node in ast.walk(function) if isinstance(node, ast.Call)}
+        if not allocates and (
+            any(is_slice(part) or ast.unparse(part) in arrays_in(function) for part in parts) or calls & allocating
+        ):
+            found.append(name)
+    return found
+
+
+def returning(source: str) -> set[str]:
+    """Helpers that allocate and return something."""
+    return {
+        name
+        for name, (function, allocates) in helpers_of(source).items()
+        if allocates and any(isinstance(node, ast.Return) and node.value for node in ast.walk(function))
+    }
+
+
+def test_helpers_that_count_no_references_return_no_array() -> None:
+    """Else the memory of an array would be freed while it is in use, or never."""
+    sources = [path.read_text(encoding="utf-8") for path in sorted((ROOT / "planes" / "jit").glob("*.py"))]
+    allocating = set().union(*map(returning, sources))
+    assert {"layout", "add_run", "_room_for"} <= allocating
+    assert [name for source in sources for name in unsafe(source, allocating)] == []
+    bad = "@helper()\ndef a(b):\n    return b[0], b\n@helper()\ndef c(b):\n    d = b[1:]\n    return d\n"
+    assert unsafe(bad + "@helper()\ndef e(b):\n    return layout(b, b)[0][0]\n", allocating) == ["a", "c", "e"]

@@ -186,7 +186,7 @@ TURN, RANK, SAMPLES, WEIGHT, PIXELS, PELLETS, KEY, X, Y = range(9)
 TOGETHER = WORD + 8  # words of the pixels of a tile that pellets of a round have hit
 
 
-@helper()
+@helper(allocates=True)
 def _room_for(pattern_box, following):
     """Scratch memory for the words of any of the patterns."""
     longest = 0
@@ -281,21 +281,163 @@ def anew(together, tiles, tile, windows, word, step, shift, low, high):
 
 # house: row order
 @helper(inline="always")
-def in_row_order(first, last, origin_x, origin_y, out, rank, key, x, y):
+def in_row_order(first, last, origin_x, origin_y, out):
     """Sort rows `first` .. `last` - 1 of a round by (key, rank), and replace the keys by squared distance and y.
 
     More than FEW_ROWS rows are left unsorted for `rows_by`.
     """
+    rank, key = out[RANK], out[KEY]
     for i in range(first + 1, last if last - first <= FEW_ROWS else 0):
         j = i
         while j > first and (key[j - 1] > key[j] or (key[j - 1] == key[j] and rank[j - 1] > rank[j])):
             for column in range(RANK, X + 1):
                 out[column, j - 1], out[column, j] = out[column, j], out[column, j - 1]
             j -= 1
-    pixels_of(first, last, origin_x, origin_y, key, x, y)
+    pixels_of(first, last, origin_x, origin_y, key, out[X], out[Y])
+
+
+@helper(forceinline=True)
+def _close_to(placement, kind, x, y, window, tiles, cells, bins, strips, meets, exclude, near):
+    """Write the tiles that a placed pattern may hit to `near`, front to back; return how many.
+
+    `window` is the box of the pattern in the world; `bins` are of `_binned`, empty if all tiles are compared.
+    """
+    left, top, right, bottom = window
+    box, close = tiles.box_xyxy, 0
+    if cells.wide:
+        cell = cell_at(x, y, cells.x, cells.y, cells.bits, cells.wide, cells.high)
+        for entry in range(cells.begin[max(cell, 0)], cells.begin[cell + 1] if cell >= 0 else cells.begin[0]):
+            tile = cells.listed[entry]
+            across = (box[tile, 0] <= right) & (box[tile, 2] >= left)
+            near[close] = tile
+            close += across & (box[tile, 1] <= bottom) & (box[tile, 3] >= top)
+    else:
+        close = near_of(box, bins[0], bins[1], bins[2], left, top, right, bottom, near)
+    if len(strips):
+        close = _crossing(strips, kind, x, y, box, near, close)
+    if len(meets) or len(tiles.occluder):
+        close = _accepted(near, close, tiles.occluder, tiles.categories, tiles.owner, meets, exclude, placement)
+    return close
+
+
+@helper(forceinline=True)
+def _laid(patterns, kind, window, box, near, close, bounds, rest):
+    """Copy the words of a placed pattern that tiles may read to `rest`, within the bounds; return their pixels."""
+    left, top, right, bottom = window
+    hull = hull_of(box, near, close, left, top, bottom)
+    pixels = lay(patterns.words, patterns.first[kind], patterns.rows[kind], hull, rest)
+    if left < bounds[0] or top < bounds[1] or right > bounds[2] or bottom > bounds[3]:
+        pixels = clip(rest, patterns.rows[kind], hull, left, top, bounds)
+    return pixels
+
+
+@helper(forceinline=True)
+def _counted(out, mine, row, row_of, turn, item, placement, samples, weight, new, nearest, x):
+    """Add what a placement hits of an item to its row, or begin one if `mine` is negative; return the last row."""
+    if mine < 0:
+        row += 1
+        out[TURN, row], out[RANK, row], out[SAMPLES, row], out[KEY, row], out[X, row] = turn, item, samples, nearest, x
+        out[WEIGHT, row], out[PIXELS, row], out[PELLETS, row], out[Y, row] = weight, new, 1, placement
+        if len(row_of):
+            row_of[item] = row
+        return row
+    out[SAMPLES, mine] += samples
+    out[WEIGHT, mine] += weight
+    out[PIXELS, mine] += new
+    out[PELLETS, mine] += out[Y, mine] != placement
+    out[Y, mine] = placement
+    if nearest < out[KEY, mine]:
+        out[KEY, mine], out[X, mine] = nearest, x
+    return row
+
+
+@helper(forceinline=True)
+def _new(at, part_of, hit, hits, together, tiles, tile, words, word, step, shift, low, high):
+    """Pixels of a tile that no pellet of the round hit before, and how many tiles its pellets have hit."""
+    if part_of[at] < 0:
+        part_of[at], hit[hits] = hits * TOGETHER, at
+        together[hits * TOGETHER : (hits + 1) * TOGETHER] = 0
+        hits += 1
+    part = together[part_of[at] + low - tiles.box_xyxy[at, 1] :]
+    return anew(part, tiles.words, tile, words, word, step, shift, low, high), hits
 
 
 # house: hit rule of areas
+@helper(forceinline=True)
+def _hit(
+    turn, placement, kind, window, origin, words, corner, pixels, patterns, tiles, pierce, several, close, near,
+    pellets, hits, first_row, row, out,
+):  # fmt: skip
+    """Write the rows of a placement; return the last row, and how many tiles the pellets of its round have hit.
+
+    The pattern lies in `words`, from `corner` on, and has so many pixels that are not used up.
+    """
+    (left, top, right, _), step, sums, occluder = window, patterns.rows[kind], patterns.sums, tiles.occluder
+    row_of, part_of, hit, together = pellets
+    for i in range(close):
+        if pixels == 0:
+            break
+        at, box = near[i], tiles.box_xyxy
+        low, high, offset = max(box[at, 1], top), min(box[at, 3], window[3]), box[at, 0] - left + 63
+        tile, word, shift = tiles.begin[at] - box[at, 1], corner + (offset >> 6) * step - top, offset & 63
+        own, level = origin[0] - box[at, 0], origin[1]
+        blocks = len(occluder) > 0 and occluder[at]
+        if blocks or not (pierce or several or len(sums)):
+            found = struck(tiles.words, tile, words, word, step, shift, low, high, own, level)
+        else:
+            found = shared(tiles.words, tile, words, word, step, shift, low, high, own, level)
+        samples, weight, new, nearest = found[0], 0, found[0], key_of(found[1], found[2], found[3])
+        if blocks or samples == 0:
+            pixels -= samples
+            continue
+        if len(sums):
+            place = patterns.first_sum[kind] + (low - top) * (right - left + 2) + offset - 63
+            weight = weighed(tiles.words, tile, words, word, step, shift, low, high, sums, place, right - left + 2)
+        item = tiles.rank[at]
+        mine = row if row >= first_row and out[RANK, row] == item else -1
+        if several:
+            mine = row_of[item]
+            new, hits = _new(at, part_of, hit, hits, together, tiles, tile, words, word, step, shift, low, high)
+        if not pierce:
+            if several or len(sums):
+                struck(tiles.words, tile, words, word, step, shift, low, high, own, level)
+            pixels -= samples
+        row = _counted(out, mine, row, row_of, turn, item, placement, samples, weight, new, nearest, found[2])
+    return row, hits
+
+
+DONE, FULL, UNDECIDED = range(3)
+"""How a round ended: its rows are written, there was no room for them, or a pixel lies too far from its origin."""
+
+
+@helper(forceinline=True)
+def _round(
+    turn, each, row, placed, patterns, tiles, cells, bins, pierce, bounds, meets, exclude, whole, near, words, pellets,
+    out,
+):  # fmt: skip
+    """Write the rows of a round after row `row`; return the last row, the tiles that pellets have hit, and its end."""
+    first_row, hits, box = row + 1, 0, patterns.box_xyxy
+    origin, several = (placed.origin_x[turn], placed.origin_y[turn]), len(pellets[1]) > 0
+    for placement in range(turn * each, turn * each + each):
+        kind, x, y = placed.pattern[placement], placed.x[placement], placed.y[placement]
+        window = x + box[kind, 0], y + box[kind, 1], x + box[kind, 2], y + box[kind, 3]
+        if is_far(origin[0], origin[1], window[0], window[1], window[2], window[3]):
+            return row, hits, UNDECIDED
+        close = _close_to(placement, kind, x, y, window, tiles, cells, bins, patterns.strips, meets, exclude, near)
+        if row + 1 + close > out.shape[1]:
+            return row, hits, FULL
+        if close == 0:
+            continue
+        corner, pixels = patterns.first[kind], 1
+        if not whole:
+            corner, pixels = PAD, _laid(patterns, kind, window, tiles.box_xyxy, near, close, bounds, words)
+        row, hits = _hit(
+            turn, placement, kind, window, origin, words, corner, pixels, patterns, tiles, pierce, several, close, near,
+            pellets, hits, first_row, row, out,
+        )  # fmt: skip
+    return row, hits, DONE
+
+
 @compiled(
     types.UniTuple(types.int64, 3)(
             types.int64, types.int64, types.int64, ROWS_OUT,
@@ -307,119 +449,40 @@ def in_row_order(first, last, origin_x, origin_y, out, rank, key, x, y):
 def match(
     turn, end, count, out, pattern, x, y, origin_x, origin_y,
     pattern_box, first, following, pattern_words, strips, sums, first_sum,
-    rank, box, tile_begin, tiles, occluder, categories, owner, cells_x, cells_y, bits, cells_wide, cells_high,
-    begin, listed,
+    rank, box, tile_begin, tile_words, occluder, categories, owner, cells_x, cells_y, bits, wide, high, begin, listed,
     pierce, bounds, meets, exclude, each,
 ):  # fmt: skip
     """Write the rows of rounds `turn` .. `end` - 1 to columns `out`, from row `count` on.
 
-    The arguments are the columns of `Placed`, `PatternBits`, `OrderedTiles`, `Cells` and `Rule`. It is one long function
-    because numba counts the references of each array at each call: in parts, a placement took up to five times as long.
-
-    Returns
-    -------
-    the round where it stopped for want of room, or -1 if it cannot decide one; rows written; most rows of a round
+    The arguments are the columns of `Placed`, `PatternBits`, `OrderedTiles`, `Cells` and `Rule`. Returned are the round
+    where it stopped for want of room, or -1 if it cannot decide one; the rows written; and the most rows of a round.
     """
-    room, most, several = out.shape[1], 0, each > 1 and len(box) > 0
-    near, boxes = np.empty(len(box), np.int64), len(box) if several else 0
-    row_of, part_of = np.full(rank[-1] + 1 if several else 0, -1), np.full(boxes, -1)  # of what pellets have hit
-    hit, together = np.empty(boxes, np.int64), np.empty(boxes * TOGETHER, np.uint64)
-    bins, binned, grid = begin[:0], listed[:0], begin[:0]
-    if not cells_wide and (end - turn) * each > FEW and len(box):
-        bins, binned, grid = _binned(box)
+    placed = Placed(pattern, x, y, origin_x, origin_y)
+    patterns = PatternBits(pattern_box, first, following, pattern_words, strips, sums, first_sum)
+    tiles = OrderedTiles(rank, box, tile_begin, tile_words, occluder, categories, owner)
+    cells = Cells(cells_x, cells_y, bits, wide, high, begin, listed)
+    most, near, boxes = 0, np.empty(len(box), np.int64), len(box) if each > 1 else 0
+    row_of, part_of = np.full(rank[-1] + 1 if boxes else 0, -1), np.full(boxes, -1)  # of what pellets have hit
+    pellets = row_of, part_of, np.empty(boxes, np.int64), np.empty(boxes * TOGETHER, np.uint64)
+    bins = begin[:0], listed[:0], begin[:0]
+    if not wide and (end - turn) * each > FEW and len(box):
+        bins = _binned(box)
     whole = pierce and not len(occluder) and bounds[0] == EVERYWHERE[0]  # nothing is taken away from patterns
     words = pattern_words if whole else _room_for(pattern_box, following)
-    ranks, keys, xs, ys = out[RANK], out[KEY], out[X], out[Y]
     while turn < end:
-        row, hits, full = count - 1, 0, False
-        for placement in range(turn * each, turn * each + each):
-            kind = pattern[placement]
-            left, top = x[placement] + pattern_box[kind, 0], y[placement] + pattern_box[kind, 1]
-            right, bottom = x[placement] + pattern_box[kind, 2], y[placement] + pattern_box[kind, 3]
-            if is_far(origin_x[turn], origin_y[turn], left, top, right, bottom):
-                return -1, 0, 0
-            if cells_wide:
-                cell = cell_at(x[placement], y[placement], cells_x, cells_y, bits, cells_wide, cells_high)
-                close = 0
-                for entry in range(begin[max(cell, 0)], begin[cell + 1] if cell >= 0 else begin[0]):
-                    tile = listed[entry]
-                    across = (box[tile, 0] <= right) & (box[tile, 2] >= left)
-                    near[close] = tile
-                    close += across & (box[tile, 1] <= bottom) & (box[tile, 3] >= top)
-            else:
-                close = near_of(box, bins, binned, grid, left, top, right, bottom, near)
-            if len(strips):
-                close = _crossing(strips, kind, x[placement], y[placement], box, near, close)
-            if len(meets) or len(occluder):
-                close = _accepted(near, close, occluder, categories, owner, meets, exclude, placement)
-            full = row + 1 + close > room
-            if full:
-                break
-            if close == 0:
-                continue
-            corner, pixels = first[kind], 1
-            if not whole:
-                corner, hull = PAD, hull_of(box, near, close, left, top, bottom)
-                pixels = lay(pattern_words, first[kind], following[kind], hull, words)
-                if left < bounds[0] or top < bounds[1] or right > bounds[2] or bottom > bounds[3]:
-                    pixels = clip(words, following[kind], hull, left, top, bounds)
-            step, broad = following[kind], pattern_box[kind, 2] - pattern_box[kind, 0] + 2
-            item = -1
-            for i in range(close):
-                if pixels == 0:
-                    break
-                at = near[i]
-                low, high = max(box[at, 1], top), min(box[at, 3], bottom)
-                offset = box[at, 0] - left + 63
-                tile, word, shift = tile_begin[at] - box[at, 1], corner + (offset >> 6) * step - top, offset & 63
-                own, level = origin_x[turn] - box[at, 0], origin_y[turn]
-                blocks = len(occluder) > 0 and occluder[at]
-                if blocks or not (pierce or several or len(sums)):
-                    found = struck(tiles, tile, words, word, step, shift, low, high, own, level)
-                else:
-                    found = shared(tiles, tile, words, word, step, shift, low, high, own, level)
-                samples, weight, new, nearest = found[0], 0, found[0], key_of(found[1], found[2], found[3])
-                if blocks or samples == 0:
-                    pixels -= samples
-                    continue
-                if len(sums):
-                    place = first_sum[kind] + (low - top) * broad + offset - 63
-                    weight = weighed(tiles, tile, words, word, step, shift, low, high, sums, place, broad)
-                if several:
-                    if part_of[at] < 0:
-                        part_of[at] = hits * TOGETHER
-                        together[hits * TOGETHER : (hits + 1) * TOGETHER] = 0
-                        hit[hits] = at
-                        hits += 1
-                    part = together[part_of[at] + low - box[at, 1] :]
-                    new = anew(part, tiles, tile, words, word, step, shift, low, high)
-                if not pierce:
-                    if several or len(sums):
-                        struck(tiles, tile, words, word, step, shift, low, high, own, level)
-                    pixels -= samples
-                mine = row_of[rank[at]] if several else row if rank[at] == item else -1
-                if mine < 0:
-                    row, mine, item = row + 1, row + 1, rank[at]
-                    out[TURN, row], out[RANK, row], out[SAMPLES, row], out[KEY, row], out[X, row] = (
-                        turn, item, samples, nearest, found[2],
-                    )  # fmt: skip
-                    out[WEIGHT, row], out[PIXELS, row], out[PELLETS, row], out[Y, row] = weight, new, 1, placement
-                    if several:
-                        row_of[item] = row
-                    continue
-                out[SAMPLES, mine] += samples
-                out[WEIGHT, mine] += weight
-                out[PIXELS, mine] += new
-                out[PELLETS, mine] += out[Y, mine] != placement
-                out[Y, mine] = placement
-                if nearest < out[KEY, mine]:
-                    out[KEY, mine], out[X, mine] = nearest, found[2]
+        row, hits, state = _round(
+            turn, each, count - 1, placed, patterns, tiles, cells, bins, pierce, bounds, meets, exclude, whole, near,
+            words, pellets, out,
+        )  # fmt: skip
+        if state == UNDECIDED:
+            return -1, 0, 0
         for k in range(hits):
-            row_of[rank[hit[k]]] = part_of[hit[k]] = -1
-        if full:
+            at = pellets[2][k]
+            row_of[rank[at]] = part_of[at] = -1
+        if state == FULL:
             break
         if row >= count:
-            in_row_order(count, row + 1, origin_x[turn], origin_y[turn], out, ranks, keys, xs, ys)
+            in_row_order(count, row + 1, origin_x[turn], origin_y[turn], out)
         most, count, turn = max(most, row + 1 - count), row + 1, turn + 1
     return turn, count, most
 

@@ -227,17 +227,23 @@ def _earliest_first(found, k, count):
         found[column, k], found[column, least] = found[column, least], found[column, k]
 
 
+@helper(allocates=True)
+def _sort_by_entry(found, count):
+    """Put items in the order of their times of entry."""
+    order = np.argsort(found[ENTER, :count])
+    for column in (RANK, ENTER, LAST):
+        held = found[column, :count].copy()
+        for k in range(count):
+            found[column, k] = held[order[k]]
+
+
 @helper()
 def _meet(items, origin, ray, wide, bounds, most, found, count):
     """Move the items that a ray touches before its end to the front, with times, cells and counts; return how many."""
     endless = np.int64(LATE), np.int64(0), np.int64(0), np.bool_(True), np.bool_(True)  # of no literal types
     occluder, met, objects, limit, last = items[3], 0, 0, np.int64(LATE), found[SOONEST]
     if count > SORTED:
-        order = np.argsort(found[ENTER, :count])
-        for column in (RANK, ENTER, LAST):
-            held = found[column, :count].copy()
-            for k in range(count):
-                found[column, k] = held[order[k]]
+        _sort_by_entry(found, count)
     for k in range(count):
         if count <= SORTED:
             _earliest_first(found, k, count)

@@ -156,7 +156,7 @@ def root_of(value):
     return root
 
 
-@helper()
+@helper(allocates=True)
 def layout(top, low):
     """Shape and row of all rows top .. low of shapes, and where those of each begin (n + 1,)."""
     begin = np.zeros(len(top) + 1, np.int64)
@@ -169,7 +169,7 @@ def layout(top, low):
     return shape, y, begin
 
 
-@helper()
+@helper(allocates=True)
 def empty_parts(count, rows):
     """Parts (count, 2, rows) of `RowRuns`, all of them empty."""
     parts = np.empty((count, 2, rows), np.int64)
@@ -177,7 +177,7 @@ def empty_parts(count, rows):
     return parts
 
 
-@helper()
+@helper(allocates=True)
 def add_run(parts, used, row, first, last):
     """Add a run, if it is not empty, to a row: to the run that was added last, if it touches that one.
 
@@ -253,7 +253,7 @@ def convex_polygons(points: Ints) -> RowRuns | None:
     return RowRuns(shape, y, parts) if convex else None
 
 
-@helper()
+@helper(allocates=True)
 def _even_odd_row(corner, following, row, parts, used, at):
     """Add to a row of a polygon what its edges touch, and what lies between every two of its crossings."""
     level, count, crossing = SUB * row, 0, np.empty(len(corner), np.int64)
