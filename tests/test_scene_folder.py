@@ -11,11 +11,12 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from hitplanes import Disc, fire, picture_of_report, report_of
 from hitplanes.planes.common.checks import InputError
 from hitplanes.planes.common.tables import Mask
 from hitplanes.planes.files import scene_folder
 from hitplanes.planes.files.png import read_png, write_png
-from hitplanes.planes.files.scene_folder import load_scene
+from hitplanes.planes.files.scene_folder import images_of, load_scene
 from hitplanes.planes.scene.items import Items
 from hitplanes.planes.scene.objects import Role
 from hitplanes.planes.scene.scene import Scene
@@ -248,6 +249,30 @@ def test_a_random_scene_is_saved_and_loaded(tmp_path: Path) -> None:
     again = reloaded(scene, tmp_path)
     assert again.bounds == scene.bounds
     assert again.ids().tolist() == scene.ids().tolist()
+
+
+def test_large_masks_look_the_same_after_saving(tmp_path: Path) -> None:
+    """One without a colour has that of its role, also where a scaled image would be drawn in other pixels."""
+    mask = np.tri(90, 80, dtype=np.bool_)
+    scene = Scene((300, 300))
+    wall = scene.add(Sprite.from_mask(mask, pivot_xy=(3, 4)), (60, 60), role="occluder", angle=33, name="wall")
+    scene.add(scene.sprite(wall), (180, 60), scale=1.3)
+    scene.add(Sprite.from_mask(~mask, color=(200, 30, 90), angle_step=5), (90, 190), angle=7, flip="x")
+    again = reloaded(scene, tmp_path / "saved")
+    assert again.sprite(wall).color is None
+    pictures = [
+        picture_of_report(report_of(each, [fire(each, Disc(40), (90, 90))]), each)
+        for each in (scene, again, reloaded(again, tmp_path / "again"))
+    ]
+    assert np.array_equal(pictures[0], pictures[1]) and np.array_equal(pictures[0], pictures[2])
+    assert images_of(again.sprite(wall)) == {"sprite.png"}
+
+
+def test_a_mask_of_a_png_is_its_alpha(tmp_path: Path) -> None:
+    scene = load_scene(folder_of(tmp_path, with_object(mask="sub/keyed.png", position_xy=[3, 3], color=[1, 2, 3])))
+    assert scene.mask(1)[0].tolist() == [[True] * 3] * 3 and scene.sprite(1).color == (1, 2, 3)
+    with pytest.raises(InputError, match=r"source\.mask: expected a path inside"):
+        Sprite.from_mask([[1]], source={"mask": "../keyed.png"})
 
 
 def test_unnamed_bits_are_kept(tmp_path: Path) -> None:
@@ -594,7 +619,8 @@ BAD_OBJECTS: dict[str, tuple[dict[str, Any], str]] = {
     "mask rows": ({"mask": ["##", "#"], "position_xy": [0, 0]}, r"mask\[1\]: expected 2 of '#' and '.', got '#'"),
     "mask letters": ({"mask": ["#x"], "position_xy": [0, 0]}, r"mask\[0\]: expected 2 of '#' and '.', got '#x'"),
     "mask mixed": ({"mask": ["#", 1], "position_xy": [0, 0]}, r"mask\[1\]: expected 1 of"),
-    "mask text": ({"mask": "##", "position_xy": [0, 0]}, "mask: expected"),
+    "mask text": ({"mask": "##", "position_xy": [0, 0]}, "mask: expected a PNG file, got '##'"),
+    "mask up": ({"mask": "../sheet.png", "position_xy": [0, 0]}, "mask: expected a path inside the scene's folder"),
     "mask empty": ({"mask": [], "position_xy": [0, 0]}, "mask: expected"),
     "mask of twos": ({"mask": [[0, 2]], "position_xy": [0, 0]}, r"mask\[0\]\[1\]: expected 0 or 1, got 2"),
     "image missing": ({**IMAGE, "image": "none.png"}, "image: expected a PNG file, got 'none.png'"),

@@ -82,7 +82,7 @@ SOURCES: dict[str, dict[str, Value]] = {
     "polygon": {"polygon": RING, "holes": Rows(RING), "color": COLOR, **COMMON},
     "circle": {"circle": Number(0, MASK_SIDE_MAX), "color": COLOR, **COMMON},
     "box_wh": {"box_wh": Numbers((2,), MASK_SIDE_MAX, low=0), "color": COLOR, **COMMON},
-    "mask": {"mask": Mask(), "pivot_xy": PIVOT, "color": COLOR, **COMMON},
+    "mask": {"mask": Either(str, Text(), Mask()), "pivot_xy": PIVOT, "color": COLOR, **COMMON},
 }
 POSE: dict[str, Value] = {
     "angle": Number(), "scale": Either(list, Numbers((2,), SCALE_MAX, low=SCALE_MIN), Number(SCALE_MIN, SCALE_MAX)),
@@ -104,7 +104,7 @@ SCENE = Keys({
 """The form of a scene file. Objects, weapons and shots are checked separately when they are read."""
 
 SHEET_WIDTH = 4096  # approximate width of the sheet on which the frames of a saved sprite are laid out in rows, px
-MASK_ROWS_AREA = 4096  # largest mask that is saved as rows of text, px; larger ones are saved as images
+MASK_ROWS_AREA = 4096  # largest mask that is saved as rows of text, px; a larger one is saved as a PNG
 
 
 class Entry(NamedTuple):
@@ -246,6 +246,13 @@ def _images_sprite(data: dict[str, Any], folder: Path, source: dict[str, Any]) -
     return Sprite.from_images(images, **data, source=source)
 
 
+def _mask_sprite(data: dict[str, Any], folder: Path, source: dict[str, Any]) -> Sprite:
+    mask = data.pop("mask")
+    if isinstance(mask, str):
+        mask = read_png(_inside(folder, mask, "mask"), "mask")[:, :, 3] > ALPHA_THRESHOLD
+    return Sprite.from_mask(mask, **data, source=source)
+
+
 def _carved_sprite(sprite: Sprite, entries: Sequence[dict[str, Any]], folder: Path) -> Sprite:
     """A sprite with what is carved out of its frames: the set pixels of images of cells."""
     carvings: dict[int, Carving] = {}
@@ -273,20 +280,20 @@ READERS: dict[str, Callable[[dict[str, Any], Path, dict[str, Any]], Sprite]] = {
     "polygon": lambda data, *_: Sprite.polygon(data.pop("polygon"), data.pop("holes", ()), **data),
     "circle": lambda data, *_: Sprite.circle(data.pop("circle"), **data),
     "box_wh": lambda data, *_: Sprite.box(*data.pop("box_wh"), **data),
-    "mask": lambda data, _, source: Sprite.from_mask(data.pop("mask"), **data, source=source),
+    "mask": _mask_sprite,
 }
 """How the sprite of each kind is made of its checked fields, which are used up."""
 
 
-def _inside(folder: Path, text: str) -> Path:
+def _inside(folder: Path, text: str, field: str = "image") -> Path:
     """Path of a file in the scene's folder; a path that leads out of the folder is refused."""
-    path = folder.joinpath(*PurePosixPath(inside("image", text)).parts)
+    path = folder.joinpath(*PurePosixPath(inside(field, text)).parts)
     try:
         within_it = path.resolve().is_relative_to(folder.resolve())
     except (OSError, RuntimeError, ValueError):  # a link to itself, a name that is too long
         within_it = False
     if not within_it:
-        raise InputError(f"image: expected a path inside the scene's folder, got {text!r}, which leads out of it")
+        raise InputError(f"{field}: expected a path inside the scene's folder, got {text!r}, which leads out of it")
     return path
 
 
@@ -339,8 +346,10 @@ def _saved_source(sprite: Sprite, folder: Path, images: dict[str, str | None]) -
         options["pivot_xy"] = [v / SUB for v in sprite.pivot_256]
     elif sprite.frames[0].pivot_256 is not None:
         options["pivot_xy"] = [[v / SUB for v in frame_pivot(sprite, frame)] for frame in sprite.frames]
-    if sprite.frames[0].image is None and masks[0].size <= MASK_ROWS_AREA:
-        return {"mask": rows_of(masks[0]), **options, **color}
+    if len(masks) == 1 and sprite.frames[0].image is None:
+        large = masks[0].size > MASK_ROWS_AREA
+        mask = _write_apart(folder, _image_name(sprite), _sheet(sprite)[0], images) if large else rows_of(masks[0])
+        return {"mask": mask, **options, **color}
     known = sprite.source or {}
     if sprite.frames[0].image is not None and "alpha_threshold" in known:
         options["alpha_threshold"] = known["alpha_threshold"]
@@ -362,13 +371,14 @@ def _cells(carving: Carving) -> Image:
 def _image_name(sprite: Sprite) -> str:
     """Path from which the image of a sprite was read, or a new name for it."""
     source = sprite.source or {}
-    return inside("source.image", source.get("image", (*source.get("images", ()), "sprite.png")[0]))
+    named = [source["mask"]] if isinstance(source.get("mask"), str) else source.get("images", ())
+    return inside("source.image", source.get("image", (*named, "sprite.png")[0]))
 
 
 def images_of(sprite: Sprite) -> set[str]:
     """Paths of the images in a scene's folder from which a sprite was read."""
     source = sprite.source or {}
-    single = {source["image"]} if "image" in source else set()
+    single = {source[key] for key in ("image", "mask") if isinstance(source.get(key), str)}
     return single | {*source.get("images", ())} | {entry["image"] for entry in source.get("carved", ())}
 
 

@@ -336,6 +336,8 @@ def _source(source: object) -> dict[str, Any] | None:
         raise InputError(f"source: expected an object, got {shown(source)}")
     if "image" in source:
         inside("source.image", source["image"])
+    if isinstance(source.get("mask"), str):
+        inside("source.mask", source["mask"])
     for i, name in enumerate(source.get("images", ())):
         inside(f"source.images[{i}]", name)
     return dict(source)
