@@ -309,7 +309,40 @@ def test_an_owner_that_was_removed_is_kept(tmp_path: Path) -> None:
         scene.add([[True]])
     scene.set([0, 1], owner=2)
     scene.remove(2)
-    reloaded(scene, tmp_path)
+    again = reloaded(scene, tmp_path)
+    assert again.owner([0, 1]).tolist() == [2, 2] and again.add([[True]]) == scene.add([[True]]) == 3
+
+
+def test_ids_of_removed_objects_are_not_given_out_again(tmp_path: Path) -> None:
+    """Also where no object is left, or the last ones belong to no one."""
+    scene = Scene()
+    for _ in range(4):
+        scene.add([[True]])
+    for gone in ([2, 3], [0, 1]):
+        scene.remove(gone)
+        assert reloaded(scene, tmp_path).add([[True]]) == 4
+    file = tmp_path / "scene.json"
+    scene.add([[True]])
+    scene.save(tmp_path)
+    assert "next_id" not in file.read_text()
+    file.write_text(file.read_text().replace('"objects"', '"next_id": 3, "objects"'))
+    with pytest.raises(InputError, match=r"next_id: expected a whole number from 5 to .*, got 3"):
+        load_scene(tmp_path)
+
+
+def test_owners_that_own_each_other(tmp_path: Path) -> None:
+    """Owners are one level deep: each of the two is a part of the other, in Python and in a file."""
+    scene = Scene()
+    a, b = scene.add([[True]], (0, 0)), scene.add([[True]], (1, 0), owner=0)
+    scene.set(a, owner=b)
+    rows: list[dict[str, Any]] = [
+        {"mask": ["#"], "position_xy": [0, 0], "name": "a", "owner": "b"},
+        {"mask": ["#"], "position_xy": [1, 0], "name": "b", "owner": "a"},
+    ]
+    read = load_scene(folder_of(tmp_path / "file", {"format": FORMAT, "objects": {"hittable": rows}}))
+    for each in (scene, reloaded(scene, tmp_path / "saved"), read):
+        assert each.owner([a, b]).tolist() == [b, a]
+        assert fire(each, Disc(3), (0, 0), exclude=a).object.tolist() == [a]
 
 
 @pytest.mark.parametrize(
@@ -551,6 +584,11 @@ BAD_FILES: dict[str, tuple[Any, str]] = {
                                        "hud": [{"circle": 1, "position_xy": [0, 0]}]}},
         "objects: expected an id for each object or for none",
     ),
+    "owner that never was": (
+        {"format": FORMAT, "objects": {"hud": [{"circle": 1, "position_xy": [0, 0], "id": 1, "owner": 2}]}},
+        r"objects.hud\[0\]: owner: expected a whole number from 0 to 1, got 2",
+    ),
+    "next id": ({"format": FORMAT, "next_id": 2**28 + 1}, "next_id: expected a whole number from 0 to 268435456"),
     "ids twice": (
         {"format": FORMAT, "objects": {"hud": [{"circle": 1, "position_xy": [0, 0], "id": 1}] * 2}},
         "id: expected each id once, got 1 again",

@@ -98,7 +98,8 @@ BOUNDS = Keys(
 )
 SCENE = Keys({
     "$schema": Text(), "format": Const(FORMAT, (ONE_FILTER,)), "name": Text(), "bounds": Optional(Within(BOUNDS)),
-    "categories": Names(), "objects": Within(Keys({section: Rows(Ref("object")) for section in SECTIONS})),
+    "categories": Names(), "next_id": Whole(0, IDS_MAX),
+    "objects": Within(Keys({section: Rows(Ref("object")) for section in SECTIONS})),
     "weapons": Mapped(Ref("weapon")), "shots": Rows(Ref("shot")),
 }, ("format",))  # fmt: skip
 """The form of a scene file. Objects, weapons and shots are checked separately when they are read."""
@@ -137,7 +138,7 @@ def load_scene(folder: str | Path) -> Scene:
         )
         scene.weapons = data.get("weapons", {})
         scene.shots = [_shot_now(shot, data["format"]) for shot in data.get("shots", ())]
-        _add_entries(scene, entries)
+        _add_entries(scene, entries, data.get("next_id"))
         return scene
 
 
@@ -163,6 +164,7 @@ def write_scene(folder: Path, scene: Scene) -> None:
         "name": scene.name,
         "bounds": scene.bounds and {"origin_xy": [x, y], "size_wh": [x_max - x + 1, y_max - y + 1]},
         "categories": _saved_categories(scene),
+        **({"next_id": items.count} if items.count > items.ids.max(initial=-1) + 1 else {}),
         "objects": objects,
         "weapons": scene.weapons,
         "shots": scene.shots,
@@ -440,7 +442,8 @@ def _digest(image: Image) -> str:
     return hashlib.sha256(repr(image.shape).encode() + image.tobytes()).hexdigest()
 
 
-def _add_entries(scene: Scene, entries: Sequence[Entry]) -> None:
+def _add_entries(scene: Scene, entries: Sequence[Entry], next_id: int | None) -> None:
+    """Add the objects of a file in the order of their ids, then set their owners, which may be later or removed."""
     numbered = [entry.id is not None for entry in entries]
     if any(numbered) and not all(numbered):
         raise InputError("objects: expected an id for each object or for none, got some")
@@ -452,13 +455,20 @@ def _add_entries(scene: Scene, entries: Sequence[Entry]) -> None:
                     raise InputError(f"id: expected each id once, got {entry.id} again")
                 scene.items.table.skip_to(entry.id)
             scene.add(**entry.options)
+    if next_id is not None:
+        scene.items.table.skip_to(integer("next_id", next_id, scene.items.count, IDS_MAX))
     for item, entry in zip(scene.ids().tolist(), entries, strict=True):
         if entry.owner is not None:
-            with within(f"{entry.place}: owner"):
-                owner = scene.find(entry.owner) if isinstance(entry.owner, str) else entry.owner
-                if entry.id is not None and owner >= scene.items.count:
-                    scene.items.table.skip_to(owner + 1)  # the owner was removed before the scene was saved
-                scene.set(item, owner=owner)
+            with within(entry.place):
+                scene.set(item, owner=_owner_id(scene, entry.owner))
+
+
+def _owner_id(scene: Scene, owner: str | int) -> int:
+    """Id of an owner, given by its name or the id of an object that the scene has or had."""
+    if isinstance(owner, str):
+        with within("owner"):
+            return scene.find(owner)
+    return integer("owner", owner, 0, scene.items.count - 1)
 
 
 @contextmanager
