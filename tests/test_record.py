@@ -174,6 +174,18 @@ def test_the_same_again_is_no_difference(path: Path) -> None:
     assert {len(entry["weapon"]) for entry in entries} and {entry["tick"] for entry in entries} == {None}
 
 
+def test_a_record_with_line_ends_of_windows_is_the_same(path: Path) -> None:
+    """Git and editors write them; a changed line is still found."""
+    with ShotRecord(path) as record:
+        record.fire(scene, Disc(9), places(5))
+    crlf = path.read_bytes().replace(b"\n", b"\r\n")
+    path.write_bytes(crlf)
+    assert replay(path, scene) is None
+    path.write_bytes(crlf.replace(b'"seed":0', b'"seed":1', 1))
+    with pytest.raises(InputError, match="line 2: chain: expected"):
+        replay(path, scene)
+
+
 def test_what_is_returned_is_what_was_hit(path: Path) -> None:
     with ShotRecord(path) as record:
         for weapon in ARSENAL:

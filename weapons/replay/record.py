@@ -363,12 +363,14 @@ class Reading:
         self.endless = self._chain is not None and not ended
 
     def _json_of(self, line: bytes) -> Any:
-        """Parse the next line, after checking that it is complete and in its place."""
+        """Parse the next line, after checking that it is complete and in its place; it may end with CRLF."""
         if len(line) > TEXT_BYTES_MAX:
             raise InputError(f"expected at most {TEXT_BYTES_MAX} bytes, got more")
         if not line.endswith(b"\n"):
             found = "one that is cut off, as by a crash: take it out" if line else "an empty file"
             raise InputError(f"expected a whole line of a record, got {found}")
+        if line.endswith(b"\r\n"):  # as git and editors of Windows write it; no line holds a bare CR
+            line = line[:-2] + b"\n"
         text = line if self._chain is None else self._chain.opened(line)
         return json_of(text.decode("utf-8", "replace"))
 
