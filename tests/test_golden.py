@@ -272,6 +272,12 @@ def test_what_is_damaged_fails_by_name_and_is_repaired(
     assert contents(tmp_path) == before and golden().kind == "same"
 
 
+def test_planes_that_are_missing_are_not_called_damaged(golden: Callable[..., Outcome], tmp_path: Path) -> None:
+    path = tmp_path / "goldens" / "test_a" / "test_x.npz"
+    path.unlink()
+    assert golden().message.splitlines()[0] == f"{path}: expected the planes of a golden, got no file"
+
+
 def test_half_a_picture_fails(golden: Callable[..., Outcome], tmp_path: Path) -> None:
     path = tmp_path / "goldens" / "test_a" / "test_x.png"
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])

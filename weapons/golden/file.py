@@ -335,9 +335,8 @@ def _read_planes(path: Path, listed: list[dict[str, Any]]) -> dict[str, Plane]:
                 data = io.BytesIO(archive.read(f"{entry['name']}.npy"))
                 planes[entry["name"]] = np.lib.format.read_array(data, allow_pickle=False)
     except DAMAGE as error:
-        raise DamagedGoldenError(
-            f"{path}: expected the planes of a golden, got a file that is damaged: {error}"
-        ) from error
+        got = "no file" if isinstance(error, FileNotFoundError) else f"a file that is damaged: {error}"
+        raise DamagedGoldenError(f"{path}: expected the planes of a golden, got {got}") from error
     return planes
 
 
