@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hitplanes import InputError, Scene, Sprite, load_scene, read_png
+from hitplanes import Disc, InputError, Scene, Sprite, fire, load_scene, read_png
 from hitplanes.planes.files.png import check_output, write_png, write_text
 from hitplanes.weapons.cli.command import main
 
@@ -561,20 +561,33 @@ NOT_SAVED: dict[str, tuple[Callable[[Scene], object], str]] = {
     "name, number": (lambda s: setattr(s, "name", 5), "name: expected a text of 1 to 200 characters, got 5"),
     "weapons, list": (lambda s: setattr(s, "weapons", []), r"weapons: expected an object, got \[\]"),
     "shots, object": (lambda s: setattr(s, "shots", {}), r"shots: expected a list, got \{\}"),
-    "weapon, an object": (lambda s: s.weapons.update(gun=Sprite), "expected weapons and shots of plain JSON"),
-    "weapon, NaN": (lambda s: s.weapons.update(gun=float("nan")), "expected weapons and shots of plain JSON"),
-    "weapon, numpy's": (lambda s: s.weapons.update(gun=np.int64(1)), "expected weapons and shots of plain JSON"),
-    "weapon, 5000 digits": (lambda s: s.weapons.update(gun=10**5000), "expected weapons and shots of plain JSON"),
-    "weapon in itself": (lambda s: s.weapons.update(gun=s.weapons), "expected weapons and shots of plain JSON"),
-    "weapon's name, a pair": (lambda s: s.weapons.update({(1, 2): 3}), "expected weapons and shots of plain JSON"),
-    "shot, a set": (lambda s: s.shots.append({1}), "expected weapons and shots of plain JSON"),
-}
+    "weapon, a class": (
+        lambda s: s.weapons.update(gun=Disc), r"^weapons\.gun: .* got <class .*Disc'>: Object of type"),
+    "weapon, an object": (
+        lambda s: s.weapons.update(gun=Sprite), r"^weapons\.gun: expected plain JSON, got <class .*Sprite"),
+    "weapon, one of Python": (
+        lambda s: s.weapons.update(gun=Disc(3)),
+        r"^weapons\.gun: expected plain JSON, got Disc\(radius=3\.0\): give what its to_json\(\) returns$"),
+    "shot, hits": (
+        lambda s: s.shots.append(fire(s, Disc(3), (9, 9))),
+        r"^shots\[7\]: expected plain JSON, got <Hits: .*: give what its to_shot\(\) returns$"),
+    "pellet, one of Python": (
+        lambda s: s.weapons.update(gun={"kind": "spread", "pellet": Disc(2)}),
+        r"^weapons\.gun: expected plain JSON, got .*: Object of type Disc is not JSON"),
+    "weapon, NaN": (lambda s: s.weapons.update(gun=float("nan")), r"^weapons\.gun: expected plain JSON, got"),
+    "weapon, numpy's": (lambda s: s.weapons.update(gun=np.int64(1)), r"^weapons\.gun: expected plain JSON, got"),
+    "weapon, 5000 digits": (lambda s: s.weapons.update(gun=10**5000), r"^weapons\.gun: expected plain JSON, got"),
+    "weapon in itself": (lambda s: s.weapons.update(gun=s.weapons), r"^weapons\.gun: expected plain JSON, got"),
+    "weapon's name, a pair": (
+        lambda s: s.weapons.update({(1, 2): 3}), r"^weapons: key: expected a text .* got \(1, 2\)"),
+    "shot, a set": (lambda s: s.shots.append({1}), r"^shots\[7\]: expected plain JSON, got \{1\}: Object of type set"),
+}  # fmt: skip
 
 DEEP: list[Any] = []
 for _ in range(10**5):
     DEEP = [DEEP]
 NOT_SAVED_YET = [
-    pytest.param(lambda s: s.shots.append(DEEP), "weapons and shots of plain JSON",
+    pytest.param(lambda s: s.shots.append(DEEP), r"^shots\[7\]: expected plain JSON, got",
           id="shot, 10^5 deep"),
     pytest.param(lambda s: s.weapons.update({i: {"kind": "point"} for i in range(9)}),
           "weapons", id="weapons' names, numbers"),
@@ -593,6 +606,9 @@ def test_a_scene_that_could_not_be_read_is_not_written(
     with pytest.raises(InputError, match=told):
         scene.save(tmp_path)
     assert (tmp_path / "scene.json").read_bytes() == before
+    with pytest.raises(InputError, match=told):
+        scene.save(tmp_path / "new")
+    assert not (tmp_path / "new").exists()
 
 
 # What is told to a terminal, a pipe and a full disk

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..common.checks import Image, InputError, integer, path_of, suggestion, within
+from ..common.checks import Image, InputError, integer, path_of, shown, suggestion, within
 from ..common.limits import (
     ALL,
     ALPHA_THRESHOLD,
@@ -145,6 +145,7 @@ def load_scene(folder: str | Path) -> Scene:
 def write_scene(folder: Path, scene: Scene) -> None:
     """Write a scene folder, images first and scene.json last, so that an interrupt leaves the old scene intact."""
     items, rows = scene.items, scene.items.rows
+    _check_json(scene)
     for row in rows.tolist():
         with within(f"object {items.id[row]}"):
             _image_name(items.sprites[row])
@@ -169,13 +170,20 @@ def write_scene(folder: Path, scene: Scene) -> None:
         "weapons": scene.weapons,
         "shots": scene.shots,
     }
-    try:
-        SCENE.forms["weapons"].check("weapons", scene.weapons)
-        text = laid_out(data)
-    except (TypeError, ValueError, RecursionError) as error:
-        what = "expected weapons and shots of plain JSON, got a value that is not"
-        raise InputError(f"scene: {what}: {error}") from error
-    write_text(folder / FILE_NAME, text + "\n")
+    write_text(folder / FILE_NAME, laid_out(data) + "\n")
+
+
+def _check_json(scene: Scene) -> None:
+    """Refuse weapons and shots that are not plain JSON, before anything is written."""
+    SCENE.forms["weapons"].check("weapons", scene.weapons)
+    places = {f"weapons.{name}": weapon for name, weapon in scene.weapons.items()}
+    for place, value in {**places, **{f"shots[{i}]": shot for i, shot in enumerate(scene.shots)}}.items():
+        try:
+            laid_out([[value]])
+        except (TypeError, ValueError, RecursionError) as error:
+            makers = [name for name in ("to_json", "to_shot") if hasattr(value, name) and not isinstance(value, type)]
+            why = f"give what its {makers[0]}() returns" if makers else str(error)
+            raise InputError(f"{place}: expected plain JSON, got {shown(value)}: {why}") from error
 
 
 def scene_folder(path: Path) -> Path:
