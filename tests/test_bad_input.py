@@ -119,9 +119,10 @@ ARRAYS: dict[str, tuple[Any, str]] = {
     "three numbers": ((1, 2, 3), r"at: expected shape \(any, 2\), got \(3,\)"),
     "columns for rows": (np.zeros((2, 5)), r"at: expected shape \(any, 2\), got \(2, 5\)"),
     "three dimensions": (np.zeros((1, 1, 2)), r"at: expected shape \(any, 2\), got \(1, 1, 2\)"),
-    "ragged": ([(1, 2), (3,)], r"at: expected an array, got \[\(1, 2\), \(3,\)\]"),
-    "ragged deep": ([1, [2]], r"at: expected an array, got \[1, \[2\]\]"),
-    "in itself": ((loop := [1], loop.append(loop), loop)[2], r"at: expected an array, got \[1, \[1, \["),
+    "ragged": ([(1, 2), (3,)], r"at: expected an array with rows of one length, got \[\(1, 2\), \(3,\)\]"),
+    "ragged arrays": ([np.zeros((2, 2)), np.zeros((2, 1))], r"at: expected an array with rows of one length, got"),
+    "ragged deep": ([1, [2]], r"at: expected an array with rows of one length, got \[1, \[2\]\]"),
+    "in itself": ((loop := [1], loop.append(loop), loop)[2], r"at: expected an array .*, got \[1, \[1, \["),
     "10^5 deep": (DEEP, r"at: expected an array, got \[\[\["),
     "5000 digits": ((1, DIGITS), r"at: expected numbers, got a list that is too long to show"),
     "400 digits": ((1, 10**400), r"at: expected numbers, got \[1, 1000"),
@@ -183,6 +184,11 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
     "sprite of booleans in three planes": (
         lambda: world().add(np.ones((2, 2, 3), bool)), "image: expected bytes .*bool"),
     "position with a masked value": (lambda: world().add(Sprite.circle(1), masked[1]), r"position_xy\[1\]: .*masked"),
+    "mask, ragged": (
+        lambda: Sprite.from_mask([[1, 0], [1]]),
+        r"mask: expected an array with rows of one length, got \[\[1, 0\], \[1\]\]"),
+    "move, ragged": (
+        lambda: world().move([0, 1], [[1, 2], [3]]), r"xy: expected an array with rows of one length, got"),
     "role": (lambda: world().add(Sprite.circle(1), role="ocluder"), "role: .*got 'ocluder' .did you mean 'occluder'"),
     "role, number": (lambda: world().add(Sprite.circle(1), role=3), "role: expected one of .*got 3"),
     "angle, text": (lambda: world().add(Sprite.circle(1), angle="90"), "angle: expected numbers, got '90'"),

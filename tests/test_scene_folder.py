@@ -649,7 +649,9 @@ BAD_OBJECTS: dict[str, tuple[dict[str, Any], str]] = {
     "box negative": ({"box_wh": [1, -2], "position_xy": [0, 0]}, r"box_wh\[1\]: expected a number from 0"),
     "polygon": ({"polygon": [[0, 0], [1, 1]], "position_xy": [0, 0]}, "polygon: expected 3 points or more"),
     "polygon null": ({"polygon": None, "position_xy": [0, 0]}, "polygon: expected numbers"),
-    "polygon point": ({"polygon": [[0, 0], [1, 1], [2]], "position_xy": [0, 0]}, "polygon: expected an array of shape"),
+    "polygon point": (
+        {"polygon": [[0, 0], [1, 1], [2]], "position_xy": [0, 0]},
+        r"polygon: expected an array of shape \(any, 2\) with rows of one length, got \[\[0, 0\], \[1, 1\], \[2\]\]"),
     "holes": ({"polygon": [[0, 0], [1, 1], [2, 0]], "holes": 5, "position_xy": [0, 0]}, "holes: expected a list"),
     "hole": ({"polygon": [[0, 0], [1, 1], [2, 0]], "holes": [[[0, 0]]], "position_xy": [0, 0]}, r"holes\[0\]: "),
     "color": ({**PLACED, "color": "red"}, "color: expected numbers"),

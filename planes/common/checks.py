@@ -61,6 +61,8 @@ def array_of(
         array = np.asarray(values, dtype)
     except (ValueError, TypeError, OverflowError) as error:
         of_shape = "" if shape is None else f" of shape {_spelled(shape)}"
+        if "inhomogeneous" in str(error):  # numpy's word for rows that differ in length
+            of_shape += " with rows of one length"
         raise InputError(f"{field}: expected an array{of_shape}, got {shown(values)}") from error
     if values is not array and array.dtype.kind in "biuf" and not _plain(values):
         _refuse_changed(field, values, array.dtype.kind == "b")
