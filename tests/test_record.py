@@ -230,7 +230,20 @@ def test_shots_at_ticks_are_fired_at_them_again(path: Path) -> None:
     assert [entry["tick"] for entry in entries[-2:]] == [10, 30]
     assert replay(path, history) is None and replay(path, history.at) is None
     found = replay(path, world)
-    assert found is not None and found.told[0].startswith("scene: its content hash is ")
+    assert found is not None and re.fullmatch(
+        r"scene: its content hash is \w+, was \w+ at tick 20: one scene stands still here, .* takes a History",
+        found.told[0],
+    )
+
+
+@pytest.mark.parametrize(
+    ("given", "got"), [("x", "str"), (None, "NoneType"), (Scene, "the class Scene, not one made of it")], ids=str
+)
+def test_what_is_no_scene_is_no_fault_of_a_line(path: Path, given: Any, got: str) -> None:
+    with ShotRecord(path) as record:
+        record.fire(scene, Point(), (62, 86))
+    with pytest.raises(InputError, match=f"^scene: expected a Scene, a History or a function of a tick, got {got}$"):
+        replay(path, given)
 
 
 def test_a_tick_that_has_left_is_named(path: Path) -> None:
@@ -250,7 +263,7 @@ def test_a_shot_without_a_tick_is_not_fired_at_a_history(path: Path) -> None:
     for scenes, told in (
         (history, "line 2: scene: expected a Scene, as a shot has no tick, got a History"),
         (lambda tick: tick, "line 2: scene: expected a Scene, got NoneType"),
-        (GALLERY, "line 2: scene: expected a Scene, got PosixPath"),
+        (GALLERY, "^scene: expected a Scene, a History or a function of a tick, got PosixPath"),
     ):
         with pytest.raises(InputError, match=told):
             replay(path, scenes)

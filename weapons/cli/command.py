@@ -127,7 +127,7 @@ instead of compiling them in the middle of a game. hitplanes.warm_up() does the 
 
 REPLAY_HELP = """\
 Fire the shots of a record again and print how the first different result differs. A game writes a record by firing
-with hitplanes.ShotRecord.
+with hitplanes.ShotRecord. SCENE stands still: a record of shots at ticks is for hitplanes.replay and their History.
 
 If a line of the record was changed, lost, doubled or moved, the record is bad input, and the error names the line. If a
 record was not closed (the game crashed), its shots are fired, and a note says that some may be missing.

@@ -305,6 +305,8 @@ def replayed(
 ) -> tuple[Difference | None, bool]:
     """Return what `replay` returns, and whether the end of the record is missing."""
     path = path_of("record", path)
+    if isinstance(scene, type) or not (isinstance(scene, Scene | History) or callable(scene)):
+        raise InputError(f"scene: expected a Scene, a History or a function of a tick, got {kind_of(scene)}")
     with possible(f"{path}: cannot read it"), path.open("rb") as lines:
         reading = Reading(path, lines)
         return _first_difference(path, _groups(iter(reading)), scene), reading.endless
@@ -438,7 +440,7 @@ def _first_difference(path: Path, groups: Iterator[list[Recorded]], scene: Any) 
             present = _scene_at(scene, first.get("tick"))
         texts: list[str] = []
         if (found := hashes.of(present)) != first["scene"]:
-            texts = [f"scene: its content hash is {found}, was {first['scene']}"]
+            texts = [f"scene: its content hash is {found}, was {first['scene']}{_at_tick(scene, first.get('tick'))}"]
             changed = changed or Difference(line, first["shot"], (*texts, "all shots do the same again"))
         for entry, result in zip(group, _results(path, present, group), strict=True):
             if result != entry.data["result"]:
@@ -472,6 +474,13 @@ def _scene_at(scene: Any, tick: float | None) -> Scene:
     if not isinstance(found, Scene):
         raise InputError(f"scene: expected a Scene, got {kind_of(found)}")
     return found
+
+
+def _at_tick(scene: Any, tick: float | None) -> str:
+    """Return the text for the tick of a shot that is fired again at a scene without ticks."""
+    if tick is None or not isinstance(scene, Scene):
+        return ""
+    return f" at tick {tick:g}: one scene stands still here, but hitplanes.replay in Python takes a History"
 
 
 def _shots_of(entries: Sequence[Mapping[str, Any]]) -> Shots:
