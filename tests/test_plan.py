@@ -329,6 +329,20 @@ def test_plans_are_added_up() -> None:
     ]
 
 
+def test_what_an_answer_is_asked_for_later_is_added_to_its_plan() -> None:
+    """It was left out of the call, or ran there, too; a call counts once."""
+    total = PlanSum()
+    total.add(told_plan(("walk", "it", 1, None, 500), verdicts="asked", hud="none"), Stage("verdicts", "all", 8, ns=70))
+    total.add(told_plan(("verdicts", "here", 1, None, 30)), Stage("verdicts", "all", 8, ns=100))
+    assert plan_lines(total.timed(), total.calls) == [
+        "stage         time  bytes  why",
+        "walk        0.5 us      1  1 of 2 calls: it",
+        "verdicts    0.2 us     17  2 of 2 calls: all",
+        "all         0.7 us     18  2 calls",
+        "hud       left out         1 of 2 calls: none",
+    ]
+
+
 # Bytes
 
 

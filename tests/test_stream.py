@@ -847,10 +847,14 @@ def test_no_one_has_to_read_what_is_said(tmp_path: Path) -> None:
 def test_the_plan_is_added_up(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     log = tmp_path / "shots.jsonl"
     shots: list[Any] = [{"weapon": "point", "at": [62, 86]}, {"weapon": "blast", "at": [62, 86]}] * 3
+    shots += [{"weapon": {"kind": "laser", "range": 90}, "at": [62, 86]}]
     log.write_bytes(b"".join(map(line_of, shots)))
     assert main(["fire", str(GALLERY), str(log), "-o", str(tmp_path / "hits.jsonl"), "--plan"]) == 0
     out = capsys.readouterr().out
-    assert re.search(r"^  weights +[\d,]+\.\d us +[\d,]+  1 of 2 calls: falloff of the hit pixels, ", out, re.M)
-    assert re.search(r"^  stack +[\d,]+\.\d us +[\d,]+  2 of 2 calls: \d+ items, ", out, re.M)
-    assert re.search(r"^  weights +left out +1 of 2 calls: the weapon has no falloff$", out, re.M)
-    assert re.search(r"^  all +[\d,]+\.\d us +[\d,]+  2 calls$", out, re.M)
+    assert re.search(r"^  weights +[\d,]+\.\d us +[\d,]+  1 of 3 calls: falloff of the hit pixels, ", out, re.M)
+    assert re.search(r"^  stack +[\d,]+\.\d us +[\d,]+  3 of 3 calls: \d+ items, ", out, re.M)
+    assert re.search(r"^  weights +left out +2 of 3 calls: the weapon has no falloff$", out, re.M)
+    assert re.search(r"^  all +[\d,]+\.\d us +[\d,]+  3 calls$", out, re.M)
+    assert re.search(r"^  verdicts +[\d,]+\.\d us +[\d,]+  2 of 3 calls: counted for the answers$", out, re.M)
+    assert re.search(r"^  passes +[\d,]+\.\d us +[\d,]+  1 of 3 calls: told for the answers, as", out, re.M)
+    assert re.search(r"^  verdicts +left out +1 of 3 calls: counted when asked for$", out, re.M)

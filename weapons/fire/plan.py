@@ -178,12 +178,14 @@ class PlanSum:
         self._sums: dict[bool, dict[str, Stage]] = {True: {}, False: {}}
         self._calls_of = Counter[tuple[bool, str]]()
 
-    def add(self, plan: Plan) -> None:
-        """Count the plan of one call."""
+    def add(self, plan: Plan, *asked: Stage) -> None:
+        """Count the plan of one call, and stages that it left out until its answer was `asked` for them."""
         self.calls += 1
-        for ran, stages in ((True, plan.ran), (False, plan.left_out)):
+        later = {stage.name for stage in asked}
+        left_out = [stage for stage in plan.left_out if stage.name not in later]
+        for ran, stages in ((True, [*plan.ran, *asked]), (False, left_out)):
+            self._calls_of.update({(ran, stage.name) for stage in stages})
             for stage in stages:
-                self._calls_of[ran, stage.name] += 1
                 if stage.name in self._sums[ran]:
                     self._sums[ran][stage.name].add(stage)
                 else:

@@ -33,7 +33,7 @@ from hitplanes.planes.scene.scene import Scene
 
 from ..fire.call import fire
 from ..fire.hits import Hits
-from ..fire.plan import PlanSum
+from ..fire.plan import PlanSum, Stage
 from ..kinds.areas import weapons_of
 from ..kinds.placements import ShotColumns
 from ..rays.contacts import Reason
@@ -430,10 +430,22 @@ def _fired(salvo: Salvo, bodies: list[bytes], reader: ShotReader, plan: PlanSum)
     answers = [b""] * len(salvo)
     for (weapon, toward, owners), rows in salvo.groups().items():
         hits = fire(reader.scene, weapon, **salvo.arguments(rows, toward, owners))
-        plan.add(hits.plan)
+        plan.add(hits.plan, _asked(hits))
         for row, answer in zip(rows.tolist(), _answers(hits), strict=True):
             answers[row] = b'{"shot":%d,"of":"%08x",%b' % (numbers[row], sums[row], answer)
     return answers
+
+
+def _asked(hits: Hits) -> Stage:
+    """Make what answers hold beside rows: verdicts, or for rays passes and stops. Return that stage."""
+    begin = time.perf_counter_ns()
+    if isinstance(hits, RayHits):
+        made = 0 if hits.plan.has_run("passes") else hits.passes.nbytes + hits.stop.nbytes
+        stage = Stage("passes", "told for the answers, as the stops are", made)
+    else:
+        stage = Stage("verdicts", "counted for the answers", hits.verdicts.nbytes)
+    stage.ns = time.perf_counter_ns() - begin
+    return stage
 
 
 def _answers(hits: Hits) -> Iterator[bytes]:
