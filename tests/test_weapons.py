@@ -228,6 +228,9 @@ def test_patterns_are_made_once() -> None:
 DISC = {"kind": "disc", "radius": 3}
 BAD: list[tuple[Any, str]] = [
     (7, "expected an object with a kind"),
+    (Disc(3), "expected an object with a kind, got Disc(radius=3.0): give what its to_json() returns"),
+    ({"knd": "disc", "radius": 3}, "key: expected one of 'kind', got 'knd' (did you mean 'kind'?)"),
+    ({"radius": 3}, "kind: expected one of"),
     ({}, "kind: expected one of"),
     ({"kind": "disk", "radius": 3}, "did you mean 'disc'?"),
     ({"kind": "disc"}, "radius: expected a value, got nothing"),

@@ -12,7 +12,7 @@ from weakref import ref
 import numpy as np
 
 from hitplanes.planes.common.backend import LruCache, jit_is_on, kernels_of
-from hitplanes.planes.common.checks import InputError, Ints, choice, integer, kind_of, shown, within
+from hitplanes.planes.common.checks import InputError, Ints, choice, integer, kind_of, shown, suggestion, within
 from hitplanes.planes.common.limits import HALF, MASK_SIDE_MAX, PATTERN_CACHE_BYTES, PELLETS_MAX, REACH_MAX, SUB
 from hitplanes.planes.common.tables import Flag, Mask, Number, Numbers, Optional, Rows, Value, Whole, Word, typed
 from hitplanes.planes.grid import fixed_point, rasterize, turns
@@ -506,7 +506,11 @@ def weapon_from_json(data: object, name: str = "weapon", kinds: tuple[type, ...]
     """
     with within(name):
         if not isinstance(data, Mapping):
-            raise InputError(f"expected an object with a kind, got {shown(data)}")
+            how = ": give what its to_json() returns" if isinstance(data, Weapon) else ""
+            raise InputError(f"expected an object with a kind, got {shown(data)}{how}")
+        for key in () if "kind" in data else data:
+            if suggestion(key, ("kind",)):
+                choice("key", key, ("kind",))
         known_kinds = [kind for kind, made in KINDS.items() if issubclass(made, kinds)]
         kind = KINDS[choice("kind", data.get("kind"), known_kinds)]
         known = {f.name: f for f in fields(kind)}
