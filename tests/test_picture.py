@@ -30,7 +30,7 @@ from hitplanes import (
 )
 from hitplanes.planes.scene.render import blend, draw_view
 from hitplanes.weapons.replay.shot_log import fire_request, requests_of
-from hitplanes.weapons.report.canvas import World, legend_of
+from hitplanes.weapons.report.canvas import EDGE, TOP, World, factor_of, legend_of
 from hitplanes.weapons.report.picture import picture_of_report
 from hitplanes.weapons.report.report import report_of
 from hitplanes.weapons.report.symbols import MARKS, TINT, glyph
@@ -151,6 +151,23 @@ def test_text_is_a_layer_of_its_own() -> None:
     with_text, without = picture_of_report(report, scene), picture_of_report(report, scene, text=False)
     assert with_text.shape == without.shape
     assert not np.array_equal(with_text, without)
+
+
+def test_a_heat_picture_names_what_was_hit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Beside it, and covering no pixel of it; what was not hit has no name."""
+    scene = Scene((200, 100))
+    for name, x in (("cat", 30), ("dog", 100), ("hen", 170)):
+        scene.add(Sprite.circle(9), (x, 50), name=name)
+    report = report_of(scene, [fire(scene, Disc(4), [(30 + 70 * (i % 2), 50) for i in range(30)])])
+    texts: list[Any] = []
+    monkeypatch.setattr("hitplanes.weapons.report.picture.draw_texts", lambda page, every: texts.extend(every))
+    with_names, without = picture_of_report(report, scene), picture_of_report(report, scene, text=False)
+    y, x = (with_names != without).any(axis=2).nonzero()
+    factor, names = factor_of((0, 0, 199, 99)), [text for text in texts if text.middle]
+    assert sorted(text.text for text in names) == ["cat", "dog"]
+    for text, middle in zip(sorted(names), (30, 100), strict=True):
+        assert abs(text.x - EDGE - factor * (middle + 0.5)) < 2 and TOP < text.y < TOP + factor * (50 - 9)
+    assert x.min() >= EDGE and x.max() < EDGE + factor * 115 and y.min() >= TOP and y.max() < TOP + factor * (50 - 9)
 
 
 @pytest.mark.parametrize(

@@ -76,7 +76,7 @@ def picture_of_report(report: Mapping[str, Any], scene: Scene, *, text: bool = T
         for verdict in MARKS:
             world.mark_heat(report["batch"], verdict)
         world.outline_seen(scene.ids(Role.HITTABLE).tolist())
-        texts, cards = [], batch_cards(report)
+        texts, cards = _names(world, report, scene) if text else [], batch_cards(report)
     else:
         texts = _shots(world, report, scene)
         cards = [shot_card(shot, n, scene, hit_now(report, n)) for n, shot in enumerate(report["shots"])]
@@ -93,6 +93,15 @@ def _check(report: object, scene: object) -> None:
     Const(FORMAT).check("report: format", report.get("format"))
     if not isinstance(scene, Scene):
         raise InputError(f"scene: expected a Scene, got {kind_of(scene)}")
+
+
+def _names(world: World, report: Mapping[str, Any], scene: Scene) -> list[Text]:
+    """Make room for the names of what a batch hit, beside the objects, and return them."""
+    hit = [{"rows": report["batch"]["objects"], "samples": {}, "blockers": ()}]
+    overlay = Overlay(world)
+    overlay.keep_free(hit, scene)
+    overlay.names(hit, scene)
+    return overlay.texts
 
 
 def _shots(world: World, report: Mapping[str, Any], scene: Scene) -> list[Text]:
