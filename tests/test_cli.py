@@ -18,7 +18,18 @@ import pytest
 from some_of import some_of
 from test_record import lines_of, write_record
 
-from hitplanes import Disc, Rifle, ShotRecord, Spread, load_scene, read_png, write_png
+from hitplanes import (
+    Disc,
+    Rifle,
+    ShotRecord,
+    Spread,
+    fire_shots,
+    load_scene,
+    picture_of_report,
+    read_png,
+    report_of,
+    write_png,
+)
 from hitplanes.weapons.cli import starter
 from hitplanes.weapons.cli.command import main
 from hitplanes.weapons.replay.record import hash_of
@@ -98,6 +109,12 @@ def test_a_negative_position_is_written_with_an_equals_sign(tmp_path: Path) -> N
         (["report", str(GALLERY), "--weapon", "beam", "--at", "1,2", "--aim", "inf"], "aim: expected a finite number"),
         (["report", str(GALLERY), "--weapon", "beam", "--at", "1,2", "--seed", "-1"], "seed: expected a whole number"),
         (["report", str(GALLERY), "--at", "1,2"], "--at: expected only together with --weapon"),
+        (["report", str(GALLERY), "--shots", "none.jsonl"], "none.jsonl: cannot read it: No such file"),
+        (["report", str(GALLERY), "--shots", "x", "--at", "1,2"], "--at: expected without --shots, got both"),
+        (
+            ["report", str(GALLERY), "--shots", "x", "--json", "x"],
+            "output: expected another file than the log of shots",
+        ),
         (["report", str(GALLERY), "-o", "/no/such/folder/r.png"], "cannot write /no/such/folder/r.png"),
         (["report", str(GALLERY), "-o", "/"], "output: cannot write /: expected the name of a file"),
         (["report", str(GALLERY), "--json", "."], "output: cannot write .: expected the name of a file"),
@@ -192,6 +209,31 @@ def test_a_reader_that_goes_away_is_no_error(tmp_path: Path) -> None:
     )
     os.close(write)
     assert (done.returncode, done.stderr) == (0, b"") and png.exists()
+
+
+def test_a_log_of_shots_is_drawn(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """More than 24 of them as a heat picture; a bad line is named, and so is a log that is too long."""
+    log, facts, png = tmp_path / "shots.jsonl", tmp_path / "r.json", tmp_path / "r.png"
+    words = ["report", str(GALLERY), "--shots", str(log), "-o", str(png), "--json", str(facts)]
+    shots = [{"weapon": "shotgun", "at": [3 * i, 90], "seed": i} for i in range(40)]
+    for count in (2, 40):
+        scene = load_scene(GALLERY)
+        scene.shots = shots[:count]
+        log.write_text("".join(json.dumps(shot) + "\n" for shot in scene.shots))
+        assert main(words) == 0
+        fired = report_of(scene, fire_shots(scene), ["shotgun"] * count)
+        assert json.loads(facts.read_text()) == json.loads(json.dumps(fired))
+        assert np.array_equal(read_png(png)[:, :, :3], picture_of_report(fired, scene))
+    assert capsys.readouterr().out.splitlines()[-1].startswith("40 shots, ")
+    monkeypatch.setattr("hitplanes.weapons.replay.shot_log.REPORTED_MAX", 39)
+    assert main(words) == 2
+    assert f"{log}: expected at most 39 shots for one picture, got more" in capsys.readouterr().err
+    log.write_text('{"weapon": "shotgun", "at": [1, 2]}\n{"weapon": "shotgn", "at": [1, 2]}\n')
+    before = facts.read_bytes()
+    assert main(words) == 2 and facts.read_bytes() == before
+    assert re.search(r"shots.jsonl line 2: weapon: .* .did you mean 'shotgun'", capsys.readouterr().err)
 
 
 def test_the_plan_of_each_shot(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -23,7 +23,7 @@ from hitplanes.planes.scene.scene import Scene
 from ..fire.hits import Hits
 from ..fire.plan import PlanSum, plan_lines
 from ..kinds.areas import weapons_of
-from ..replay.shot_log import ShotRequest, fire_request, request_from_json, requests_of
+from ..replay.shot_log import REPORTED_MAX, ShotRequest, fire_request, request_from_json, requests_of, requests_of_log
 from ..replay.stream import Progress, fire_log
 from ..report.cards import place_text
 from ..report.differences import differences
@@ -36,7 +36,8 @@ DESCRIPTION = "Find out what a shot hits in a 2-D scene, pixel by pixel and exac
 
 REPORT_HELP = """\
 Fire shots at a scene and draw a picture that shows what was hit and why. --json writes the same facts as JSON.
-By default the shots in scene.json are fired. With --weapon and --at, one shot of your own is fired instead.
+By default the shots in scene.json are fired; with --shots those of a log, as fire takes it; with --weapon and --at one
+of your own. More than 24 shots become one heat picture.
 """
 
 REPORT_EXAMPLES = """\
@@ -46,6 +47,7 @@ examples:
   hitplanes report fixtures/gallery --json - | python -m json.tool
   hitplanes report fixtures/gallery --weapon shotgun --at 138,91 --seed 7
   hitplanes report fixtures/gallery --weapon beam --at 100,167 --aim -4.5
+  hitplanes report fixtures/gallery --shots shots.jsonl -o heat.png
 """
 
 FIRE_HELP = """\
@@ -315,6 +317,8 @@ def _add_measurements(commands: Any) -> None:
 
 def _add_report(commands: Any) -> None:
     sub = _command(commands, report, "fire at a scene and draw what was hit", REPORT_HELP, REPORT_EXAMPLES)
+    text = f"fire the shots of this log, one a line, {REPORTED_MAX} at most"
+    sub.add_argument("--shots", type=Path, metavar="SHOTS.jsonl", help=text)
     sub.add_argument("--weapon", metavar="NAME", help="fire one shot with this weapon of the scene; needs --at")
     sub.add_argument("--at", metavar="X,Y", help="position of the shot, px (write --at=-5,3 if X is negative)")
     sub.add_argument("--aim", type=float, metavar="DEG", help="direction in degrees: 0 is right, 90 is down")
@@ -357,6 +361,8 @@ def report(arguments: argparse.Namespace) -> None:
     _check_outputs(arguments.output, file)
     scene = load_scene(arguments.scene)
     _check_not_of_scene(scene, arguments.scene, arguments.output, file)
+    if arguments.shots is not None and _real(arguments.shots) in map(_real, filter(None, (arguments.output, file))):
+        raise InputError(f"output: expected another file than the log of shots, got {arguments.shots}")
     requests = _requests(arguments, scene)
     how = {"prefilter": arguments.prefilter, "broadphase": arguments.broadphase}
     asked = {name: value for name, value in how.items() if value is not None}
@@ -375,14 +381,18 @@ def report(arguments: argparse.Namespace) -> None:
 
 
 def _requests(arguments: argparse.Namespace, scene: Scene) -> list[ShotRequest]:
-    """Return the shots of the scene's file, or the one of the command line."""
+    """Return the shots of the scene's file, those of a log, or the one of the command line."""
+    given = [name for name in ("weapon", "at", "aim", "toward", "seed") if getattr(arguments, name) is not None]
     with within(str(scene_folder(arguments.scene) / FILE_NAME)):
         weapons = weapons_of(scene)
-        if all(getattr(arguments, name) is None for name in ("weapon", "at", "aim", "toward", "seed")):
+        if not given and arguments.shots is None:
             return requests_of(scene, weapons)
+    if arguments.shots is not None:
+        if given:
+            raise InputError(f"--{given[0]}: expected without --shots, got both")
+        return requests_of_log(scene, weapons, arguments.shots)
     if arguments.weapon is None:
-        given = next(name for name in ("at", "aim", "toward", "seed") if getattr(arguments, name) is not None)
-        raise InputError(f"--{given}: expected only together with --weapon, got no weapon")
+        raise InputError(f"--{given[0]}: expected only together with --weapon, got no weapon")
     return [request_from_json(_shot(arguments), scene, weapons, "command line")]
 
 
@@ -392,7 +402,7 @@ def _print_hits(facts: Mapping[str, Any], planned: Sequence[Hits]) -> None:
     if batch:
         _say(f"{batch['shots']} shots, {batch['shots_that_hit']} hit something")
     elif not facts["shots"]:
-        _say(f"{facts['scene']['name']}: no shots in its scene.json; name one with --weapon and --at")
+        _say(f"{facts['scene']['name']}: no shots to fire; name one with --weapon and --at")
     for i, shot in enumerate(facts["shots"]):
         hit = ", ".join(f"{row['name']} {row['pixels']} px" for row in shot["rows"][:NAMED]) or "nothing"
         if len(shot["rows"]) > NAMED:

@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
+from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -29,6 +30,7 @@ from hitplanes.planes.common.tables import (
     Whole,
     distinct_keys,
 )
+from hitplanes.planes.files.png import possible
 from hitplanes.planes.grid.fixed_point import snap
 from hitplanes.planes.grid.spans import Columns
 from hitplanes.planes.scene.items import Stack
@@ -171,6 +173,7 @@ def _owner(scene: Scene, value: object, row: int) -> int:
 
 LINE_MAX = 2**20  # longest line of a log, bytes; enough for a shot that excludes thousands of objects by name
 CHUNK_BYTES = 2**22  # bytes of lines that are read at a time; in memory they take about ten times as much
+REPORTED_MAX = 20_000  # most shots of a log in one report: each is an answer of its own, some 20 kB and 1 ms
 FEW = 16  # unusual lines are read one by one if there are at most this many; otherwise they are split into halves
 
 _decode = json.JSONDecoder(object_pairs_hook=distinct_keys).raw_decode
@@ -284,14 +287,18 @@ class ShotReader:
         tail, error = self.read(bodies[half:], first + half)
         return Salvo.joined([head, tail]), error
 
+    def request(self, body: bytes, number: int) -> ShotRequest:
+        """Check one line without its break; `number` is that of the line, from 0."""
+        with within(self.place(number)):
+            data = _parsed(body)
+        return request_from_json(data, self.scene, self.weapons, self.place(number), number)
+
     def _one_by_one(self, bodies: list[bytes], first: int) -> tuple[Salvo, InputError | None]:
         """Check each line by the rules for a scene's shots, which name the error."""
         requests: list[ShotRequest] = []
         for number, body in enumerate(bodies, first):
             try:
-                with within(self.place(number)):
-                    data = _parsed(body)
-                requests.append(request_from_json(data, self.scene, self.weapons, self.place(number), number))
+                requests.append(self.request(body, number))
             except InputError as error:
                 return Salvo.of_requests(requests), error
         return Salvo.of_requests(requests), None
@@ -329,6 +336,17 @@ class ShotReader:
         _usual(type(owners) is list and {type(owner) for owner in owners} <= {int, str})
         _usual(all(0 <= owner < self.scene.items.count for owner in owners if type(owner) is int))
         return tuple(self._owners[owner] if type(owner) is str else owner for owner in owners)
+
+
+def requests_of_log(scene: Scene, weapons: Mapping[str, Weapon], log: Path) -> list[ShotRequest]:
+    """Return the shots of a log that a report can show; one without a number gets that of its line, from 0."""
+    reader, requests = ShotReader(scene, weapons, str(log)), list[ShotRequest]()
+    with possible(f"{log}: cannot read it"), log.open("rb") as lines:
+        while body := lines.readline(LINE_MAX + 3):
+            if len(requests) == REPORTED_MAX:
+                raise InputError(f"{log}: expected at most {REPORTED_MAX} shots for one picture, got more: draw a part")
+            requests.append(reader.request(body_of(body), len(requests)))
+    return requests
 
 
 def _parsed(body: bytes) -> Any:
