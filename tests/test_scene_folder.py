@@ -586,7 +586,7 @@ BAD_FILES: dict[str, tuple[Any, str]] = {
     ),
     "owner that never was": (
         {"format": FORMAT, "objects": {"hud": [{"circle": 1, "position_xy": [0, 0], "id": 1, "owner": 2}]}},
-        r"objects.hud\[0\]: owner: expected a whole number from 0 to 1, got 2",
+        r"objects.hud\[0\]: owner: expected .* from 0 to 1, got 2: if .* removed, the scene needs a next_id of 3$",
     ),
     "next id": ({"format": FORMAT, "next_id": 2**28 + 1}, "next_id: expected a whole number from 0 to 268435456"),
     "ids twice": (

@@ -468,15 +468,19 @@ def _add_entries(scene: Scene, entries: Sequence[Entry], next_id: int | None) ->
     for item, entry in zip(scene.ids().tolist(), entries, strict=True):
         if entry.owner is not None:
             with within(entry.place):
-                scene.set(item, owner=_owner_id(scene, entry.owner))
+                scene.set(item, owner=_owner_id(scene, entry))
 
 
-def _owner_id(scene: Scene, owner: str | int) -> int:
+def _owner_id(scene: Scene, entry: Entry) -> int:
     """Id of an owner, given by its name or the id of an object that the scene has or had."""
+    owner, last = entry.owner, scene.items.count - 1
     if isinstance(owner, str):
         with within("owner"):
             return scene.find(owner)
-    return integer("owner", owner, 0, scene.items.count - 1)
+    if entry.id is not None and owner is not None and owner > last:
+        how = f"if that object was removed, the scene needs a next_id of {owner + 1}"
+        raise InputError(f"owner: expected a whole number from 0 to {last}, got {owner}: {how}")
+    return integer("owner", owner, 0, last)
 
 
 @contextmanager
