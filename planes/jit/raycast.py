@@ -569,16 +569,11 @@ def _given(
     return sides, items, filters or (NONE, NOBODY), EVERYWHERE if bounds is None else bounds
 
 
-def _fit(lines: Lines) -> bool:
-    """Whether all rays fit the kernels."""
-    return fits(int(np.abs(lines.step).max(initial=0)), lines.radius)
-
-
 def hits_and_ends(
     stack: Stack, bounds: Box | None, lines: Lines, most: int | None, filters: tuple[Ints, Ints] | None = None
 ) -> tuple[Ints, Ints] | None:
     """See `weapons.rays.raycast.hits_and_ends`; None if rays are so long or so wide that int64 overflows."""
-    if not _fit(lines):
+    if not fits(int(np.abs(lines.step).max(initial=0)), lines.radius):
         return None
     sides, items, whose, within = _given(stack, lines, filters, bounds)
     ends = np.zeros((6, len(lines)), np.int64)
@@ -592,8 +587,8 @@ def hits_and_ends(
 
 def verdicts_of_rays(walk: Any, filters: tuple[Ints, Ints] | None, bounds: Box | None) -> Ints | None:
     """See `weapons.explain.ray_verdicts.verdicts_of_rays`; None if rays are so long or so wide that it is faster."""
-    lines, ends, stack = walk.lines, walk.ends, walk.stack
-    if int(np.abs(lines.step).max(initial=0)) > (LISTED if lines.radius else SUB * REACH_MAX) or not _fit(lines):
+    lines, ends, stack, longest = walk.lines, walk.ends, walk.stack, int(np.abs(walk.lines.step).max(initial=0))
+    if longest > (LISTED if lines.radius else SUB * REACH_MAX) or not fits(longest, lines.radius):
         return None
     sides, items, whose, within = _given(stack, lines, filters, bounds)
     stops = np.stack([ends.reason, ends.time, ends.y, ends.x, ends.rank, ends.alone])
