@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hitplanes import Beam, Box, Cone, Disc, Hits, Point, Ring, Rounds, Scene, Spread, Sprite, Stencil, Weapon, fire
-from hitplanes.weapons.explain.samples import Margin
+from hitplanes.weapons.explain.margins import Margin
 
 WEAPONS = (
     Point(), Disc(2), Disc(3.5, pierce=True), Ring(2, 4), Box(4, 3), Cone(7, 50), Beam(8, 2), Stencil(["#.#", ".#."]),
@@ -137,3 +137,16 @@ def test_margins_with_a_line_of_sight_know_what_lies_beyond_the_reach_of_the_sho
     scene.add(np.ones((41, 1), np.bool_), (29, 20), role="occluder")
     assert not fire(scene, Disc(5, line_of_sight="occluders"), (20, 20)).margins()
     assert [margin.object for margin in fire(scene, Disc(5), (20, 20)).margins()] == [target]
+
+
+@pytest.mark.parametrize("weapon", WEAPONS, ids=lambda w: w.kind)
+def test_margins_do_not_depend_on_how_many_shifts_are_tried_at_a_time(
+    weapon: Weapon, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = Scene()
+    for at in ((0, 3), (6, 0), (-9, 2), (1, -8)):
+        scene.add(Sprite.box(3, 3), at)
+    hits = fire(scene, weapon, (0, 0))
+    told = hits.margins()
+    monkeypatch.setattr("hitplanes.weapons.explain.margins.CHUNK_SAMPLES", 30)
+    assert hits.margins() == told != []

@@ -466,11 +466,11 @@ def test_why_an_object_was_not_hit(name: str) -> None:
         assert hits.nearest_miss() is not None
 
 
-def test_what_a_ray_touches_as_its_budget_is_used_up_is_no_miss_and_has_no_margin() -> None:
+def test_what_a_ray_touches_as_its_budget_is_used_up_is_no_miss() -> None:
     """Beside what took the last px, and a step behind it."""
     bodies = [bar(2, 4), bar(5, 6), bar(8, 9)]
     hits = fired(Battle(Gun("rifle", range=20, budget=3), [Shot((0, 0))], bodies))
-    assert {margin.object: margin.distance for margin in hits.margins(0) if not margin.hit} == {1: 0.0, 2: 3.0}
+    assert {margin.object: margin.distance for margin in hits.margins(0) if not margin.hit} == {1: 1.75, 2: 4.0}
     miss = hits.nearest_miss(0)
     assert miss is not None and (miss.object, miss.distance) == (2, 3.0)
     assert [why[:4] for why in hits.why_not(0)] == [(1, "behind", 2, {0: 1}), (2, "behind", 2, {0: 1})]

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from types import ModuleType
 
+    from .explain import margins as margins
     from .explain import owners as owners
-    from .explain import ray_margins as ray_margins
     from .explain import ray_samples as ray_samples
     from .explain import ray_verdicts as ray_verdicts
     from .explain import samples as samples
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from .replay import shot_log as shot_log
 
 _PLACES = (
-    "explain.owners", "explain.ray_margins", "explain.ray_samples", "explain.ray_verdicts", "explain.samples",
+    "explain.margins", "explain.owners", "explain.ray_samples", "explain.ray_verdicts", "explain.samples",
     "fire.shelter", "fire.spans", "fire.verdicts", "kinds.draws", "prepared.prepare", "rays.one_ray", "rays.ray_call",
     "replay.shot_log",
 )  # fmt: skip

@@ -67,7 +67,8 @@ VALUES = {"ALL": "All categories: the default of `accept`.", "__version__": "The
 RESULTS = {
     "hitplanes.weapons.explain.owners": ("OwnerRow",),
     "hitplanes.weapons.fire.hits": ("HitRow",),
-    "hitplanes.weapons.explain.samples": ("Samples", "Share", "Blocked", "Behind", "WhyNot", "Margin"),
+    "hitplanes.weapons.explain.samples": ("Samples", "Share", "Blocked", "Behind", "WhyNot"),
+    "hitplanes.weapons.explain.margins": ("Margin",),
     "hitplanes.weapons.explain.ray_samples": ("Miss",),
     "hitplanes.weapons.rays.ray_hits": ("Passes", "Stops"),
     "hitplanes.weapons.replay.record": ("Difference",),

@@ -1,4 +1,4 @@
-"""Explanations of shots of area weapons: samples, shares, blockers, why not, and margins."""
+"""Explanations of shots of area weapons: samples, shares, blockers, and why not."""
 
 from __future__ import annotations
 
@@ -14,14 +14,12 @@ import numpy as np
 from hitplanes.planes import late
 from hitplanes.planes.bits.span_walk import BLOCK, HIT, SHELTERED, SKIP, VERDICT_OF, Events, Runs, Verdict, ends, walk
 from hitplanes.planes.common.checks import Bools, InputError, Ints
-from hitplanes.planes.common.limits import CHUNK_SAMPLES, DETAIL_SAMPLES_MAX, FRAGILE_PX, MARGIN_PX, NEAR_PX
+from hitplanes.planes.common.limits import CHUNK_SAMPLES, DETAIL_SAMPLES_MAX, NEAR_PX
 from hitplanes.planes.grid.spans import Box, Spans, clipped, each_pixel, pieces
 from hitplanes.planes.scene.items import Stack
-from hitplanes.planes.scene.scene import Scene
 
 from ..fire.prefilter import QueryContext, pairs_of, refused
 from ..fire.shelter import shelter_ranks, sheltered
-from ..fire.spans import context_of, direct
 from ..kinds.areas import parts_of
 from ..kinds.placements import Placements, Shots, placements_for
 from ..kinds.weapon import Weapon
@@ -378,74 +376,3 @@ def spans_of(stack: Stack, rank: int) -> Spans:
     """Pixels of an item of the stack."""
     x, y = stack.box_xyxy[rank, :2].tolist()
     return Spans.from_mask(stack.mask(rank), (x, y))
-
-
-class Margin(NamedTuple):
-    """Shortest shift of a shot that changes whether it hits an object.
-
-    `hit` says whether the shot as fired hits the object; `distance` is the length of `shift_xy`, px. The shift is the
-    first by (y, x) of equally short ones; for patterns it is in whole pixels.
-    """
-
-    shot: int
-    object: int
-    hit: bool
-    distance: float
-    shift_xy: tuple[float, float]
-
-    @property
-    def fragile(self) -> bool:
-        """Whether a shift of one pixel is enough."""
-        return self.distance <= FRAGILE_PX
-
-
-def margins_of(scene: Scene, stack: Stack, weapon: Weapon, shot: Shots, number: int) -> list[Margin]:
-    """Margins of the objects for which a whole-pixel shift of a shot, up to MARGIN_PX, changes whether they are hit.
-
-    They are sorted by object; `shot` is a batch of one, and `number` that of the shot.
-    """
-    if not len(stack):
-        return []
-    context, found = context_of(scene, stack, weapon, shot, MARGIN_PX), []
-    still, flips = _flips(placements_for(weapon, shot), shot, context)
-    for rank in sorted(np.flatnonzero(flips >= 0).tolist(), key=lambda rank: int(stack.ids[rank])):
-        dx, dy = SHIFTS[flips[rank]].tolist()
-        length = math.sqrt(dx * dx + dy * dy)
-        found.append(Margin(number, int(stack.ids[rank]), bool(still[rank]), length, (dx, dy)))
-    return found
-
-
-def _shifts() -> Ints:
-    """Whole-pixel shifts (n, 2) of at most MARGIN_PX, sorted by (length, y, x); the first is (0, 0)."""
-    y, x = np.mgrid[-MARGIN_PX : MARGIN_PX + 1, -MARGIN_PX : MARGIN_PX + 1].reshape(2, -1)
-    length2 = x * x + y * y
-    order = np.lexsort((x, y, length2))
-    return np.asarray(np.stack([x, y], axis=1)[order[length2[order] <= MARGIN_PX**2]])
-
-
-SHIFTS = _shifts()
-
-
-def _flips(placements: Placements, shot: Shots, context: QueryContext) -> tuple[Bools, Ints]:
-    """Whether a shot hits each item of the stack, and the number of the first shift that changes this, -1 for none."""
-    n, each = len(context.stack), len(placements)
-    still, flips = np.zeros(n, np.bool_), np.full(n, -1)
-    step = max(1, CHUNK_SAMPLES // max(int(placements.count.sum()), 1))
-    edges = [0, 1, *range(1 + step, len(SHIFTS), step), len(SHIFTS)]
-    for first, last in pairwise(edges):
-        met = direct(_shifted(placements, SHIFTS[first:last]), shot, context)
-        hit = np.zeros((last - first, n), np.bool_)
-        hit[met.placement // each, met.rank] = True
-        if not first:
-            still = hit[0]
-        turned = hit != still
-        flips = np.where((flips < 0) & turned.any(axis=0), first + turned.argmax(axis=0), flips)
-    return still, flips
-
-
-def _shifted(placements: Placements, shift: Ints) -> Placements:
-    """Placements repeated for each shift, all as placements of shot 0."""
-    n, table = len(shift), placements.table
-    xy = np.tile(placements.xy, (n, 1)) + np.repeat(shift, len(placements), axis=0)
-    pattern, turn_xy = np.tile(placements.pattern, n), np.tile(placements.turn_xy, (n, 1))
-    return Placements(table, pattern, xy, turn_xy, placements.rounds, placements.pellets, _shot=0)

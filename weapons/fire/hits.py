@@ -28,8 +28,9 @@ from .plan import Plan
 from .prefilter import QueryContext
 
 if TYPE_CHECKING:
+    from ..explain.margins import Margin
     from ..explain.owners import OwnerRow, Pellet
-    from ..explain.samples import Blocked, Detail, Margin, Samples, Share, WhyNot
+    from ..explain.samples import Blocked, Detail, Samples, Share, WhyNot
 
 
 class HitRow(NamedTuple):
@@ -365,10 +366,10 @@ class Hits:
         A margin is the shortest whole-pixel shift of the pattern, up to 8 px, that turns an object from hit to not
         hit or back. A margin of 1 px is fragile.
         """
-        numbers = range(len(self.shots)) if shot is None else [self._checked(shot)]
-        return [
-            margin for i in numbers for margin in late.samples.margins_of(*self._then(i), self.weapon, self._one(i), i)
-        ]
+        found: list[Margin] = []
+        for row in range(len(self.shots)) if shot is None else [self._checked(shot)]:
+            found += late.margins.pattern_margins(*self._then(row), self.weapon, self._one(row), row)
+        return found
 
     @property
     def has_margins(self) -> bool:

@@ -6,7 +6,7 @@ scene -> stack -> weapon -> rays -> way: cast at the items, or march to the firs
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import cache, partial
 from itertools import takewhile
@@ -28,7 +28,7 @@ from ..fire.strategy import RAY_WAYS, RayChoice, are_faster_alone, chosen_candid
 from ..kinds.placements import Shots
 from ..kinds.rays import RayWeapon, ends_at_first, is_thin_first
 from ..kinds.weapon import Weapon
-from .contacts import Parts, Rays, Terminations, Touches, rays_of
+from .contacts import Parts, Rays, Reason, Terminations, Touches, rays_of
 from .first_hit import FirstHits, ends_by_march
 from .ray_hits import Later, Passes, RayHits, Stops, Summed, Walk, pixels_of, rows_of_passes, walked_of
 from .ray_walk import Range, expected_cells, has_whole_walk, trace
@@ -135,6 +135,21 @@ def end_times(scene: Scene, ray: RayWeapon, view: View | None, count: int) -> Ca
     return ended
 
 
+def items_hit(scene: Scene, parts: Parts, shots: Shots) -> tuple[Ints, Ints]:
+    """Items that shots hit, as (shot, rank), some several times. Rows, passes and stops are not made."""
+    ray, rays = parts[2], rays_of(parts, shots)
+    how = ("auto", "auto", "auto")
+    through, chosen, choose = _planned(scene, ray, view_of(False, shots), len(rays), how, Plan())
+    if ends_at_first(ray):
+        ends = _first_ends(rays, ray, shots, through, chosen.way, choose)
+        hit = np.flatnonzero(ends.reason == Reason.HITS)
+        return rays.shot[hit], ends.rank[hit]
+    walks = _to_ends(rays, ray, shots, through, chosen.way, choose)
+    found = [(walk.rays.shot[walk.hit.ray], walk.hit.rank) for walk in walks]
+    shot, rank = (np.concatenate(column) for column in zip(*found, strict=True))
+    return shot, rank
+
+
 def _later_of(found: list[tuple[int, Walk | Made | FirstHits]], shots: Shots, ray: RayWeapon, through: Range) -> Later:
     """Functions that tell more of chunks of shots, which are given with the number of their first shot."""
     bounds = through.bounds
@@ -220,6 +235,14 @@ def _walks(rays: Rays, ray: RayWeapon, shots: Shots, through: Range) -> Iterator
         step = max(1, min(most, CHUNK_GROWTH * step, CHUNK_CELLS * begin // max(cells, 1)))
 
 
+def _to_ends(rays: Rays, ray: RayWeapon, shots: Shots, through: Range, way: str, choose: Choose) -> Iterable[Walk]:
+    """Walks of rays that go on, by the chosen way; those that cannot be cast walk."""
+    cast = cast_rays(rays, ray, shots, through) if way == "cast" else None
+    if cast is None and way == "cast":
+        through = _walking(through, choose, len(rays))
+    return cast or _walks(rays, ray, shots, through)
+
+
 def _followed(
     rays: Rays, ray: RayWeapon, shots: Shots, through: Range, way: str, choose: Choose, room: int
 ) -> tuple[list[Walk | Made], Rows, int]:
@@ -236,10 +259,7 @@ def _followed(
     """
     walks: list[Walk | Made] = []
     summed, pixels, plan = [], [], through.plan
-    cast = cast_rays(rays, ray, shots, through) if way == "cast" else None
-    if cast is None and way == "cast":
-        through = _walking(through, choose, len(rays))
-    for walk in cast or _walks(rays, ray, shots, through):
+    for walk in _to_ends(rays, ray, shots, through, way, choose):
         summed.append(walk.summed)
         pixels.append(pixels_of(walk, rays))
         plan.run("rows", "passes, gathered by object", pixels[-1].nbytes)

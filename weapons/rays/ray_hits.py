@@ -38,9 +38,10 @@ from .contacts import (
 )
 
 if TYPE_CHECKING:
+    from ..explain.margins import Margin
     from ..explain.owners import Pellet
     from ..explain.ray_samples import Miss, RayDetail
-    from ..explain.samples import Blocked, Margin, Samples, Share, WhyNot
+    from ..explain.samples import Blocked, Samples, Share, WhyNot
 
 
 SIDE = np.arange(-2, 3)
@@ -411,23 +412,22 @@ class RayHits(Hits):
         raise InputError("hits: expected those of a weapon with a pattern, got those of rays: their passes tell more")
 
     def margins(self, shot: int | None = None) -> list[Margin]:
-        """Margins of one shot, or of all: the shortest shifts, up to 8 px, that change whether an object is hit.
+        """How far the hits of one shot, or of all, are from flipping, by (shot, object).
 
-        All rays of a shot are shifted together. For an object that was hit they go on as far as they would if no object
-        ended them; for an object that was missed they end where they stopped.
+        A margin is the shortest shift of all rays of a shot together, up to 8 px, with which it hits an object that it
+        missed, or misses one that it hit. Whatever ends a shifted ray counts. A margin of at most 1 px is fragile.
         """
         if self._scenes is None:
             self.scene_of(0)  # raises for an answer of an older scene, even an empty one
         found: list[Margin] = []
         for row in range(len(self.shots)) if shot is None else [self._checked(shot)]:
-            hit = {record.object for record in self.of(row)}
-            found += late.ray_margins.ray_margins(self._rays(row), self.scene_of(row), self._parts[2], row, hit)
+            found += late.margins.ray_margins(self.scene_of(row), self._parts, self._one(row), row)
         return found
 
     @property
     def has_margins(self) -> bool:
-        """Whether margins are defined: not for a projectile tested in steps, nor for very many rays."""
-        return late.ray_margins.has_ray_margins(self._parts[2], self.rays // max(len(self.shots), 1))
+        """Whether margins can be computed: not those of shots of more than 1024 rays."""
+        return self.rays // max(len(self.shots), 1) <= late.margins.RAYS_MAX
 
     def _rays(self, shot: int) -> RayDetail:
         scene, row = self.scene_of(shot), self._checked(shot)

@@ -23,8 +23,6 @@ def fragile(entry: Mapping[str, Any], turned: str) -> str | None:
     margin = entry.get("margin")
     if margin is None or margin["distance"] > FRAGILE_PX:
         return None
-    if not margin["distance"]:
-        return "! fragile: it only touches"
     return f"! fragile: {margin['distance']:.2g} px {_way(margin['shift_xy'])} {turned}"
 
 
