@@ -250,10 +250,10 @@ def test_a_small_scene_gets_no_broad_phase_and_a_large_batch_does() -> None:
 
 def test_single_shots_make_a_broad_phase_when_it_would_have_paid(monkeypatch: pytest.MonkeyPatch) -> None:
     """As long as no shot alone pays for it none is made; then what was lost adds up."""
-    now = costs.NUMPY._replace(box_pair=400.0)
+    now = costs.NUMPY._replace(box_pair=300.0, bvh_call=6e4, bvh_placement=500.0, bvh_item=700.0, bvh_moved=1500.0)
     monkeypatch.setattr(costs, "NUMPY", now)
     scene = crowd(7, 600, 900)
-    lost = 400.0 * len(scene.items.stack()) - now.bvh_placement - now.bvh_call
+    lost = 300.0 * len(scene.items.stack()) - now.bvh_placement - now.bvh_call
     due = math.floor(len(scene.items.stack()) * now.bvh_item / lost) + 1
     assert due > 2
     made = []
@@ -262,7 +262,7 @@ def test_single_shots_make_a_broad_phase_when_it_would_have_paid(monkeypatch: py
         made.append(scene.derived.index("bvh").boxes is not None)
     assert made.index(True) == due - 1
     scene.move(scene.ids(), (5, 5))  # to follow all would cost more than the shot saves
-    assert not why(fire(scene, Point(), (3, 3), strategy="spans").plan.ran, "broad phase") or lost > 250.0 * 600
+    assert not why(fire(scene, Point(), (3, 3), strategy="spans").plan.ran, "broad phase")
 
 
 UNUSED = (

@@ -50,26 +50,26 @@ class Costs(NamedTuple):
 
 
 NUMPY = Costs(
-    tiles_call=210000, tiles_placement=103, tiles_pair=3.79,
-    visible_call=218000, visible_placement=148, visible_made=172000, visible_tile=2200,
-    labels_call=82500, labels_item=8820, labels_pixel=0.0799, labels_box=18400,
-    integers_call=118000, integers_placement=323, integers_pair=2490, integers_bit=0.113,
-    box_pair=0.765, bvh_call=91300, bvh_placement=564, bvh_moved=1480, bvh_item=766,
-    cast_call=645000, cast_ray=724, cast_pair=14.2,
-    march_call=263000, march_ray=471, field_pixel=5.35,
-    prepared_march=9360, prepared_cast=43800, prepared_cast_item=51.3,
+    tiles_call=143000, tiles_placement=82.3, tiles_pair=2.26,
+    visible_call=131000, visible_placement=112, visible_made=81900, visible_tile=1240,
+    labels_call=68400, labels_item=5840, labels_pixel=0.0442, labels_box=16800,
+    integers_call=84400, integers_placement=232, integers_pair=1980, integers_bit=0.0756,
+    box_pair=0.585, bvh_call=63700, bvh_placement=297, bvh_moved=887, bvh_item=433,
+    cast_call=203000, cast_ray=602, cast_pair=11.7,
+    march_call=173000, march_ray=321, field_pixel=4.06,
+    prepared_march=7080, prepared_cast=35000, prepared_cast_item=32.2,
     prepared_tile=inf, prepared_near=inf, thread=inf,
 )  # fmt: skip
 COMPILED = Costs(
-    tiles_call=120000, tiles_placement=121, tiles_pair=0.376,
-    visible_call=78800, visible_placement=46.8, visible_made=126000, visible_tile=1160,
-    labels_call=33900, labels_item=532, labels_pixel=0.0741, labels_box=1480,
+    tiles_call=54200, tiles_placement=33.9, tiles_pair=0.248,
+    visible_call=55400, visible_placement=40.9, visible_made=73900, visible_tile=1290,
+    labels_call=37700, labels_item=333, labels_pixel=0.0426, labels_box=4960,
     integers_call=inf, integers_placement=inf, integers_pair=inf, integers_bit=inf,
-    box_pair=0.354, bvh_call=87200, bvh_placement=548, bvh_moved=1320, bvh_item=767,
-    cast_call=146000, cast_ray=255, cast_pair=1.26,
-    march_call=172000, march_ray=122, field_pixel=1.57,
-    prepared_march=9490, prepared_cast=5030, prepared_cast_item=2.69,
-    prepared_tile=1.33, prepared_near=302, thread=836000,
+    box_pair=0.572, bvh_call=62900, bvh_placement=314, bvh_moved=847, bvh_item=442,
+    cast_call=98600, cast_ray=142, cast_pair=0.877,
+    march_call=118000, march_ray=110, field_pixel=1.25,
+    prepared_march=7220, prepared_cast=3290, prepared_cast_item=1.9,
+    prepared_tile=1.17, prepared_near=378, thread=997000,
 )  # fmt: skip
 """Times in numpy, and with compiled kernels."""
 

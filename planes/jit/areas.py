@@ -88,9 +88,8 @@ def near_of(box, begin, listed, cells, left, top, right, bottom, near):
     if not len(cells):
         for tile in range(len(box)):
             across = (box[tile, 0] <= right) & (box[tile, 2] >= left)
-            if across & (box[tile, 1] <= bottom) & (box[tile, 3] >= top):
-                near[count] = tile
-                count += 1
+            near[count] = tile  # the next overwrites it if it is not near
+            count += across & (box[tile, 1] <= bottom) & (box[tile, 3] >= top)
         return count
     x, y, bits, wide, high = cells[0], cells[1], cells[2], cells[3], cells[4]
     first, last = max((left - WORD + 1 - x) >> bits, 0), min((right - x) >> bits, wide - 1)
@@ -100,9 +99,8 @@ def near_of(box, begin, listed, cells, left, top, right, bottom, near):
         for entry in range(begin[row * wide + first], begin[row * wide + last + 1]):
             tile = listed[entry]
             across = (box[tile, 0] <= right) & (box[tile, 2] >= left)
-            if across & (box[tile, 1] <= bottom) & (box[tile, 3] >= top):
-                near[count] = tile
-                count += 1
+            near[count] = tile
+            count += across & (box[tile, 1] <= bottom) & (box[tile, 3] >= top)
     _sort(near, count)
     return count
 
@@ -531,7 +529,7 @@ def paint(labels: Labels, x: int, y: int, dirty: Ints, places: Ints, masks: Bool
                 paint_item(labels, x, y, left, top, right, low, place, masks)
 
 
-@compiled()
+@helper()
 def paint_item(
     labels: Labels, x: int, y: int, left: int, top: int, right: int, low: int, place: Any, masks: Bools
 ) -> None:

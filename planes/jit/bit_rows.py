@@ -363,7 +363,7 @@ def pixels_within(placed: Placed, windows: PatternBits, count: Ints, bounds: Box
     return inside
 
 
-BRUTE_PAIRS = 2**21  # most pairs of boxes that are compared one by one; with more, numpy lists them in cells
+BRUTE_PAIRS = 2**14  # most pairs of boxes that are compared one by one; of more, numpy compares several at once
 
 
 @helper(inline="always")
@@ -385,17 +385,17 @@ def meets_any(box, at, taken, count):
     return False
 
 
-@compiled(types.int64(BOXES, BOXES, OUT, OUT))
-def _met(asked, boxes, rows, others):
-    count, room = 0, len(rows)
-    for row in range(len(asked)):
+@compiled(types.UniTuple(types.int64, 2)(BOXES, BOXES, types.int64, types.int64, ROWS_OUT))
+def _met(asked, boxes, row, count, pairs):
+    """Write pairs from a row of `asked` on, as long as there is room; return the row that follows, and their number."""
+    while row < len(asked) and count + len(boxes) <= pairs.shape[1]:
         left, top, right, bottom = asked[row]
         for box in range(len(boxes)):
-            if (left <= boxes[box, 2]) & (right >= boxes[box, 0]) & (top <= boxes[box, 3]) & (bottom >= boxes[box, 1]):
-                if count < room:
-                    rows[count], others[count] = row, box
-                count += 1
-    return count
+            across = (left <= boxes[box, 2]) & (right >= boxes[box, 0])
+            pairs[0, count], pairs[1, count] = row, box  # the next overwrites it if the boxes do not meet
+            count += across & (top <= boxes[box, 3]) & (bottom >= boxes[box, 1])
+        row += 1
+    return row, count
 
 
 def met_boxes(asked_xyxy: Ints, boxes_xyxy: Ints) -> tuple[Ints, Ints]:
@@ -403,10 +403,9 @@ def met_boxes(asked_xyxy: Ints, boxes_xyxy: Ints) -> tuple[Ints, Ints]:
     if len(asked_xyxy) * len(boxes_xyxy) > BRUTE_PAIRS:
         return cells.met_boxes(asked_xyxy, boxes_xyxy)
     asked_xyxy, boxes_xyxy = np.ascontiguousarray(asked_xyxy), np.ascontiguousarray(boxes_xyxy)
-    room = 4 * len(asked_xyxy) + 64
+    row, count, pairs = 0, 0, np.empty((2, 4 * len(asked_xyxy) + len(boxes_xyxy)), np.int64)
     while True:
-        rows, others = np.empty(room, np.int64), np.empty(room, np.int64)
-        count = _met(asked_xyxy, boxes_xyxy, rows, others)
-        if count <= room:
-            return rows[:count], others[:count]
-        room = count
+        row, count = _met(asked_xyxy, boxes_xyxy, row, count, pairs)
+        if row == len(asked_xyxy):
+            return pairs[0, :count], pairs[1, :count]
+        pairs = np.concatenate([pairs, np.empty_like(pairs)], axis=1)

@@ -51,7 +51,7 @@ def distances_of(taken: Bools) -> Clearance:
     return distance
 
 
-@compiled()
+@helper()
 def _spread_along(row: Clearance) -> None:
     """Limit each cell of a row to 1 more than the cells beside it."""
     for x in range(1, len(row)):
@@ -97,7 +97,7 @@ def first_taken(distances: Clearance, start_256: Ints, step_256: Ints) -> tuple[
     return entry, cell, several
 
 
-@compiled()
+@helper()
 def _closed(block, left, free, holes):  # type: ignore[no-untyped-def]
     """Move the last rays of a block to the free places; return the number of rays."""
     for hole in range(holes - 1, -1, -1):
@@ -107,7 +107,7 @@ def _closed(block, left, free, holes):  # type: ignore[no-untyped-def]
     return left
 
 
-@compiled()
+@helper()
 def _done(block, left, jump, free):  # type: ignore[no-untyped-def]
     """Write the places of rays that hit or ended to `free`; return how many."""
     holes = 0
@@ -117,7 +117,7 @@ def _done(block, left, jump, free):  # type: ignore[no-untyped-def]
     return holes
 
 
-@compiled(error_model="numpy")
+@helper(error_model="numpy")
 def _look(block, count, look):  # type: ignore[no-untyped-def]
     """Write the place of the cell that each ray looks at; at a corner it is ~place, a negative number."""
     for slot in range(count):
@@ -128,7 +128,7 @@ def _look(block, count, look):  # type: ignore[no-untyped-def]
         look[slot] = ~place if i == quotient else place
 
 
-@compiled()
+@helper()
 def _jump(flat, block, count, look, jump):  # type: ignore[no-untyped-def]
     """Move rays by the distance at their cells, up to their ends."""
     for slot in range(count):
@@ -140,7 +140,7 @@ def _jump(flat, block, count, look, jump):  # type: ignore[no-untyped-def]
         block[N, slot] = min(block[N, slot] + far, block[STOP, slot])
 
 
-@compiled()
+@helper()
 def _entry(place, width, start_256, step_256):  # type: ignore[no-untyped-def]
     """Time at which a ray enters a cell."""
     ahead_x, ahead_y = SUB * (place % width) - start_256[0], SUB * (place // width) - start_256[1]
@@ -149,7 +149,7 @@ def _entry(place, width, start_256, step_256):  # type: ignore[no-untyped-def]
     return max((ahead_x - HALF) * max(abs(dy), 1), (ahead_y - HALF) * max(abs(dx), 1), 0)
 
 
-@compiled()
+@helper()
 def _between(flat, block, slot, x_256, y_256):  # type: ignore[no-untyped-def]
     """Whether a ray starts on a border and touches a taken cell there, other than the one that it enters."""
     on_x, on_y = (x_256 & (SUB - 1)) == HALF, (y_256 & (SUB - 1)) == HALF
@@ -162,7 +162,7 @@ def _between(flat, block, slot, x_256, y_256):  # type: ignore[no-untyped-def]
     return on_y and (flat[base - across] == 0 or (on_x and flat[base - step - across] == 0))
 
 
-@compiled(error_model="numpy")
+@helper(error_model="numpy")
 def over(numerator, denominator):  # type: ignore[no-untyped-def]
     """Quotient of whole numbers, rounded down, by floats where that is exact."""
     if abs(numerator) < EXACT:
@@ -170,7 +170,7 @@ def over(numerator, denominator):  # type: ignore[no-untyped-def]
     return numerator // denominator
 
 
-@compiled(error_model="numpy")
+@helper(error_model="numpy")
 def _way(height, width, x_256, y_256, step_x, step_y, block, slot):  # type: ignore[no-untyped-def]
     """Write the columns of a ray to its block; return 0, or NOTHING or UNDECIDED."""
     back_x, back_y = step_x < 0, step_y < 0
