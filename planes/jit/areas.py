@@ -436,37 +436,33 @@ def _round(
     return row, hits, DONE
 
 
-@compiled(
-    types.UniTuple(types.int64, 3)(
-            types.int64, types.int64, types.int64, ROWS_OUT,
-            *[INTS] * 5, BOXES, INTS, INTS, types.uint64[::1], BOXES, SUMS, INTS,
-            INTS, BOXES, INTS, WORDS, FLAGS, INTS, INTS, *[types.int64] * 5, INTS, INTS,
-            types.boolean, types.UniTuple(types.int64, 4), INTS, OWNERS, types.int64
-    )
-)  # fmt: skip
-def match(
-    turn, end, count, out, pattern, x, y, origin_x, origin_y,
-    pattern_box, first, following, pattern_words, strips, sums, first_sum,
-    rank, box, tile_begin, tile_words, occluder, categories, owner, cells_x, cells_y, bits, wide, high, begin, listed,
-    pierce, bounds, meets, exclude, each,
-):  # fmt: skip
+PLACED, CELLS = types.UniTuple(INTS, 5), types.Tuple((*[types.int64] * 5, INTS, INTS))
+PATTERNS = types.Tuple((BOXES, INTS, INTS, types.uint64[::1], BOXES, SUMS, INTS))
+TILES = types.Tuple((INTS, BOXES, INTS, WORDS, FLAGS, INTS, INTS))
+RULE = types.boolean, types.UniTuple(types.int64, 4), INTS, OWNERS
+"""Types of the columns of `Placed`, `Cells`, `PatternBits` and `OrderedTiles`, and of what `Rule` says."""
+
+
+@compiled(types.UniTuple(types.int64, 3)(
+    types.int64, types.int64, types.int64, ROWS_OUT, PLACED, PATTERNS, TILES, CELLS, *RULE, types.int64
+))  # fmt: skip
+def match(turn, end, count, out, placed, patterns, tiles, cells, pierce, bounds, meets, exclude, each):
     """Write the rows of rounds `turn` .. `end` - 1 to columns `out`, from row `count` on.
 
-    The arguments are the columns of `Placed`, `PatternBits`, `OrderedTiles`, `Cells` and `Rule`. Returned are the round
-    where it stopped for want of room, or -1 if it cannot decide one; the rows written; and the most rows of a round.
+    `placed`, `patterns`, `tiles` and `cells` are the columns of `Placed`, `PatternBits`, `OrderedTiles` and `Cells`, as
+    plain tuples. Returned are the round where it stopped for want of room, or -1 if it cannot decide one; the rows
+    written; and the most rows of a round.
     """
-    placed = Placed(pattern, x, y, origin_x, origin_y)
-    patterns = PatternBits(pattern_box, first, following, pattern_words, strips, sums, first_sum)
-    tiles = OrderedTiles(rank, box, tile_begin, tile_words, occluder, categories, owner)
-    cells = Cells(cells_x, cells_y, bits, wide, high, begin, listed)
-    most, near, boxes = 0, np.empty(len(box), np.int64), len(box) if each > 1 else 0
+    placed, patterns, tiles, cells = Placed(*placed), PatternBits(*patterns), OrderedTiles(*tiles), Cells(*cells)
+    rank, box, most = tiles.rank, tiles.box_xyxy, 0
+    near, boxes = np.empty(len(box), np.int64), len(box) if each > 1 else 0
     row_of, part_of = np.full(rank[-1] + 1 if boxes else 0, -1), np.full(boxes, -1)  # of what pellets have hit
     pellets = row_of, part_of, np.empty(boxes, np.int64), np.empty(boxes * TOGETHER, np.uint64)
-    bins = begin[:0], listed[:0], begin[:0]
-    if not wide and (end - turn) * each > FEW and len(box):
+    bins = cells.begin[:0], cells.listed[:0], cells.begin[:0]
+    if not cells.wide and (end - turn) * each > FEW and len(box):
         bins = _binned(box)
-    whole = pierce and not len(occluder) and bounds[0] == EVERYWHERE[0]  # nothing is taken away from patterns
-    words = pattern_words if whole else _room_for(pattern_box, following)
+    whole = pierce and not len(tiles.occluder) and bounds[0] == EVERYWHERE[0]  # nothing is taken away from patterns
+    words = patterns.words if whole else _room_for(patterns.box_xyxy, patterns.rows)
     while turn < end:
         row, hits, state = _round(
             turn, each, count - 1, placed, patterns, tiles, cells, bins, pierce, bounds, meets, exclude, whole, near,
@@ -480,7 +476,7 @@ def match(
         if state == FULL:
             break
         if row >= count:
-            in_row_order(count, row + 1, origin_x[turn], origin_y[turn], out)
+            in_row_order(count, row + 1, placed.origin_x[turn], placed.origin_y[turn], out)
         most, count, turn = max(most, row + 1 - count), row + 1, turn + 1
     return turn, count, most
 
@@ -506,8 +502,8 @@ def front_to_back(
         tiles_each = len(tiles.rank) if near is None else LISTED * len(cells.listed) / max(len(cells.begin) - 1, 1)
         least = COMPILED.thread / (each * (COMPILED.tiles_placement + COMPILED.tiles_pair * tiles_each))
         found = rows_by(
-            match, Y + 1, len(placed.origin_x), least,
-            *placed, *windows, *tiles, *cells, rule.pierce, EVERYWHERE if rule.bounds is None else rule.bounds,
+            match, Y + 1, len(placed.origin_x), least, tuple(placed), tuple(windows), tuple(tiles), tuple(cells),
+            rule.pierce, EVERYWHERE if rule.bounds is None else rule.bounds,
             accepted, NOBODY if rule.exclude is None else rule.exclude, each,
         )  # fmt: skip
     if found is None:
@@ -549,7 +545,7 @@ def paint_item(
         begin += width
 
 
-CELLS = types.Array(types.boolean, 2, "C", readonly=True)
+COARSE = types.Array(types.boolean, 2, "C", readonly=True)
 BITS = np.uint64(COARSE_BITS)
 
 
@@ -557,7 +553,7 @@ BITS = np.uint64(COARSE_BITS)
 @compiled(
     *(
         types.int64(
-            types.Array(kind, 2, "C", readonly=True), CELLS, *[types.int64] * 2, BOXES, FLAGS, OUT, OUT, ROWS_OUT
+            types.Array(kind, 2, "C", readonly=True), COARSE, *[types.int64] * 2, BOXES, FLAGS, OUT, OUT, ROWS_OUT
         )
         for kind in (types.uint16, types.uint32)
     )

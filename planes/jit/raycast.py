@@ -14,7 +14,8 @@ from ..common.limits import HALF, REACH_MAX, SUB
 from ..grid.rasterize import DIAGONAL, FAR, Lines
 from ..grid.spans import Box
 from ..scene.items import Stack
-from .areas import NOBODY, NONE, OWNERS, refuses
+from .areas import CELLS, NOBODY, NONE, OWNERS, refuses
+from .areas import NOWHERE as NO_CELLS
 from .bit_rows import BOXES, EVERYWHERE, FLAGS, INTS, ROWS_OUT, cell_at, meets_any, rows_by
 from .cache import compiled, helper
 from .planes import (
@@ -48,7 +49,7 @@ LISTED = 4096 * SUB
 FARTHEST, LONG = 2**29, 2**50
 """Longest ray of which sums of products fit int64, 1/256 px, and squared length below which those of `share` do."""
 
-NOWHERE = (0, 0, 0, 0, 0), NONE, NONE
+NOWHERE = tuple(NO_CELLS)
 """Cells that list no items: all boxes are compared."""
 
 SORTED = 32
@@ -175,11 +176,12 @@ def _comes_before(found, one, other):
 
 
 @helper()
-def _listed(grid, begin, listed, ray, origin, reach, near):
+def _listed(cells, ray, origin, reach, near):
     """Copy the items that are listed in the cell of the corner of a ray's box; return how many."""
     x, y, dx, dy, _, _ = ray
     left, top = (min(x, x + dx) - reach + SUB - 1) >> 8, (min(y, y + dy) - reach + SUB - 1) >> 8
-    cell = cell_at(left + origin[0], top + origin[1], grid[0], grid[1], grid[2], grid[3], grid[4])
+    grid_x, grid_y, bits, wide, high, begin, listed = cells
+    cell = cell_at(left + origin[0], top + origin[1], grid_x, grid_y, bits, wide, high)
     if cell < 0:
         return 0
     for i in range(begin[cell], begin[cell + 1]):
@@ -190,9 +192,9 @@ def _listed(grid, begin, listed, ray, origin, reach, near):
 @helper()
 def _entered_by(items, cells, meets, exclude, row, origin, ray, wide, bounds, near, found):
     """Write rank and bounds of the times of the accepted items whose boxes a ray enters; return how many."""
-    (box, _, _, _, categories, owner), (grid, begin, listed), reach = items, cells, max(wide[0], HALF)
-    if len(listed) > 0:
-        listed_count = _listed(grid, begin, listed, ray, origin, reach, near)
+    (box, _, _, _, categories, owner), reach = items, max(wide[0], HALF)
+    if cells[3]:
+        listed_count = _listed(cells, ray, origin, reach, near)
     else:
         listed_count = near_of(box, origin[0], origin[1], ray, bounds, near, reach)
     count = 0
@@ -320,7 +322,7 @@ def _sort(found, order, count):
 
 RAYCAST = types.Tuple((types.int64, types.int64, types.int64))(
     types.int64, types.int64, types.int64, ROWS_OUT, PAIRS, PAIRS, types.int64, PAIRS, types.int64,
-    ITEMS, types.Tuple((types.UniTuple(types.int64, 5), INTS, INTS)), INTS, OWNERS, BOUNDS, ROWS_OUT,
+    ITEMS, CELLS, INTS, OWNERS, BOUNDS, ROWS_OUT,
 )  # fmt: skip
 
 
@@ -545,13 +547,12 @@ def _verdicts(
         counts[row, Verdict.OUTSIDE], counts[row, Verdict.BEYOND] = outside, after
 
 
-def _cells(stack: Stack, lines: Lines) -> tuple[tuple[int, ...], Ints, Ints]:
+def _cells(stack: Stack, lines: Lines) -> tuple[Any, ...]:
     """The items listed by cells of the corners of the rays' boxes, if that spares most comparisons; else nothing."""
     size = (np.abs(lines.step).max(axis=0, initial=0) + 2 * max(lines.radius, HALF)) // SUB + 2
     if len(lines) * len(stack) <= BRUTE_PAIRS or not is_sparse(stack.sizes, size):
         return NOWHERE
-    listed = cells_of(stack.box_xyxy, np.concatenate([[0, 0], size]), int(size.max()).bit_length())
-    return tuple(listed[:5]), listed.begin, listed.listed
+    return tuple(cells_of(stack.box_xyxy, np.concatenate([[0, 0], size]), int(size.max()).bit_length()))
 
 
 def fits(longest: int, radius: int) -> bool:

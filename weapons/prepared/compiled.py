@@ -26,8 +26,24 @@ from hitplanes.planes.common.limits import HALF, WEIGHT_FULL
 from hitplanes.planes.grid.rasterize import DIAGONAL
 from hitplanes.planes.grid.spans import Box
 from hitplanes.planes.jit import raycast as cast
-from hitplanes.planes.jit.areas import KEY, NOBODY, OWNERS, PELLETS, PIXELS, RANK, SAMPLES, SUMS, WEIGHT, X, Y, match
-from hitplanes.planes.jit.bit_rows import BOXES, EVERYWHERE, FEW_ROWS, FLAGS, INTS, ROWS_OUT, WORDS, cell_at
+from hitplanes.planes.jit.areas import (
+    CELLS,
+    KEY,
+    NOBODY,
+    OWNERS,
+    PATTERNS,
+    PELLETS,
+    PIXELS,
+    RANK,
+    RULE,
+    SAMPLES,
+    TILES,
+    WEIGHT,
+    X,
+    Y,
+    match,
+)
+from hitplanes.planes.jit.bit_rows import EVERYWHERE, FEW_ROWS, INTS, ROWS_OUT, cell_at
 from hitplanes.planes.jit.cache import compiled
 from hitplanes.planes.jit.raycast import NOWHERE, fits, follow
 from hitplanes.planes.scene.derived import View
@@ -38,8 +54,6 @@ from ..fire.hits import HitRow
 from ..rays.one_ray import Follow, Followed
 from .one_shot import Filter, OneShot, Round
 from .position_cache import FARTHEST, ODD, PIXEL, Look, new
-
-EACH_TILE, EACH_SHOT = int(COMPILED.prepared_tile), int(COMPILED.prepared_near)
 
 PIECE_BYTES = 400
 """Memory of a round in addition to its pixels, bytes."""
@@ -57,11 +71,8 @@ ROW_BYTES, OUT = 8 * ROW, (Y + 1) * FEW_ROWS
 read = struct.Struct("8q").unpack_from
 NO_STRIPS, ZERO = np.zeros((0, 4), np.int64), np.zeros(1, np.int64)
 ACCEPT_ALL = NO_NUMBERS, NOBODY
-NOWHERE_NEAR = (0, 0, 0, 0, 0), NO_NUMBERS, NO_NUMBERS
-"""Grid, cells and lists of shots that walk all tiles."""
-
-NUMBERS, GRID = types.Array(types.int64, 1, "C", readonly=True), types.UniTuple(types.int64, 5)
-BOUNDS = types.UniTuple(types.int64, 4)
+NOWHERE_NEAR = 0, 0, 0, 0, 0, NO_NUMBERS, NO_NUMBERS
+"""Cells of shots that walk all tiles."""
 
 
 @structref.register
@@ -75,8 +86,8 @@ class ShotTiles(structref.StructRefProxy):
     Parameters
     ----------
     item : ids by rank
-    rank, box, begin, words, occluder, categories, owner : columns of `OrderedTiles`
-    grid, cell_begin, listed : columns of `Cells`; no cells if shots walk all tiles
+    tiles : columns of `OrderedTiles`
+    cells : columns of `Cells`; no cells if shots walk all tiles
     pierce, bounds : as in `front_to_back.Rule`
     meets, exclude : filter of the shots, as columns; (0,) and (1, 0) if they accept all items
     worth, spent : ns that the visible set takes, and that shots have walked for want of it; 0 if it is there
@@ -84,10 +95,9 @@ class ShotTiles(structref.StructRefProxy):
 
 
 OF_TILES = [
-    ("item", NUMBERS), ("rank", NUMBERS), ("box", BOXES), ("begin", NUMBERS), ("words", WORDS), ("occluder", FLAGS),
-    ("categories", NUMBERS), ("owner", NUMBERS), ("grid", GRID), ("cell_begin", NUMBERS), ("listed", NUMBERS),
-    ("pierce", types.boolean), ("bounds", BOUNDS), ("meets", INTS), ("exclude", OWNERS),
-    ("worth", types.int64), ("spent", types.int64),
+    ("item", INTS), ("tiles", TILES), ("cells", CELLS),
+    *zip(("pierce", "bounds", "meets", "exclude"), RULE, strict=True),
+    ("worth", types.float64), ("spent", types.float64),
 ]  # fmt: skip
 
 
@@ -97,13 +107,10 @@ class ShapeType(types.StructRef):
 
 
 class Shape(structref.StructRefProxy):
-    """A round in kernels: columns of `PatternBits`, of one pattern without a strip, and the pixels of its pellets."""
+    """A round in kernels: columns of `PatternBits`, of one pattern, and the pixels of its pellets."""
 
 
-OF_SHAPE = [
-    ("box", BOXES), ("first", NUMBERS), ("rows", NUMBERS), ("words", types.uint64[::1]), ("sums", SUMS),
-    ("first_sum", NUMBERS), ("pellet_x", INTS), ("pellet_y", INTS),
-]  # fmt: skip
+OF_SHAPE = [("pattern", PATTERNS), ("pellet_x", INTS), ("pellet_y", INTS)]
 
 
 def struct_of(proxy: type, of: type, fields: list[tuple[str, Any]]) -> Any:
@@ -117,35 +124,29 @@ SHOT_TILES, SHAPE = struct_of(ShotTiles, ShotTilesType, OF_TILES), struct_of(Sha
 
 
 @compiled(SHOT_TILES(*[of for _, of in OF_TILES[:-1]]))
-def _shot_tiles(
-    item, rank, box, begin, words, occluder, categories, owner, grid, cell_begin, listed, pierce, bounds,
-    meets, exclude, worth,
-):  # fmt: skip
-    return ShotTiles(
-        item, rank, box, begin, words, occluder, categories, owner, grid, cell_begin, listed, pierce, bounds,
-        meets, exclude, worth, 0,
-    )  # fmt: skip
+def _shot_tiles(item, tiles, cells, pierce, bounds, meets, exclude, worth):
+    return ShotTiles(item, tiles, cells, pierce, bounds, meets, exclude, worth, 0.0)
 
 
 @compiled(SHAPE(*[of for _, of in OF_SHAPE]))
-def _shape(box, first, rows, words, sums, first_sum, pellet_x, pellet_y):
-    return Shape(box, first, rows, words, sums, first_sum, pellet_x, pellet_y)
+def _shape(pattern, pellet_x, pellet_y):
+    return Shape(pattern, pellet_x, pellet_y)
 
 
 @compiled(types.int64(types.float64, types.float64, SHOT_TILES, SHAPE, types.int64[:, ::1]), nogil=False)
-def _shot(at_x, at_y, tiles, shape, found):
+def _shot(at_x, at_y, ground, shape, found):
     """Number of rows of a round at a position, which are written to `found`, (FEW_ROWS, ROW)."""
     if not (-FARTHEST < at_x < FARTHEST and -FARTHEST < at_y < FARTHEST) or at_x == ODD or at_y == ODD:
         return UNKNOWN
     column, row = np.int64(np.floor(at_x + PIXEL)), np.int64(np.floor(at_y + PIXEL))
-    (left, top, bits, wide, high), begin, count = tiles.grid, tiles.cell_begin, len(tiles.rank)
+    left, top, bits, wide, high, begin, _ = ground.cells
     if wide:
         cell = cell_at(column, row, left, top, bits, wide, high)
         if cell < 0 or begin[cell] == begin[cell + 1]:
             return 0
-    elif tiles.worth:
-        tiles.spent += EACH_TILE * count + EACH_SHOT
-        if tiles.spent > tiles.worth:
+    elif ground.worth:
+        ground.spent += COMPILED.prepared_tile * len(ground.tiles[0]) + COMPILED.prepared_near
+        if ground.spent > ground.worth:
             return MAKE_VISIBLE
     pellets = len(shape.pellet_x)
     scratch = np.empty(OUT + 2 + 3 * pellets, np.int64)
@@ -155,17 +156,14 @@ def _shot(at_x, at_y, tiles, shape, found):
     for pellet in range(pellets):
         x[pellet], y[pellet], kind[pellet] = column + shape.pellet_x[pellet], row + shape.pellet_y[pellet], 0
     turn, rows, _ = match(
-        0, 1, 0, out, kind, x, y, origin_x, origin_y,
-        shape.box, shape.first, shape.rows, shape.words, NO_STRIPS, shape.sums, shape.first_sum,
-        tiles.rank, tiles.box, tiles.begin, tiles.words, tiles.occluder, tiles.categories, tiles.owner,
-        left, top, bits, wide, high, begin, tiles.listed, tiles.pierce, tiles.bounds, tiles.meets, tiles.exclude,
-        pellets,
+        0, 1, 0, out, (kind, x, y, origin_x, origin_y), shape.pattern, ground.tiles, ground.cells,
+        ground.pierce, ground.bounds, ground.meets, ground.exclude, pellets,
     )  # fmt: skip
     if turn < 1:
         return UNKNOWN
     for row in range(rows):
-        found[row, 0], found[row, 1], found[row, 2] = tiles.item[out[RANK, row]], out[SAMPLES, row], out[PIXELS, row]
-        found[row, 3] = out[WEIGHT, row] if len(shape.sums) else WEIGHT_FULL * out[SAMPLES, row]
+        found[row, 0], found[row, 1], found[row, 2] = ground.item[out[RANK, row]], out[SAMPLES, row], out[PIXELS, row]
+        found[row, 3] = out[WEIGHT, row] if len(shape.pattern[5]) else WEIGHT_FULL * out[SAMPLES, row]
         found[row, 4], found[row, 5], found[row, 6] = out[PELLETS, row], out[X, row], out[Y, row]
         found[row, 7] = out[KEY, row]
     return rows
@@ -187,15 +185,15 @@ class GroundCache:
         self.pierce = pierce
         self._scene = scene
         self._stack: Stack | None = None
-        self._columns: list[Any] = []
+        self._columns: Any = ()
         self._lock = threading.Lock()
 
-    def read(self, stack: Stack) -> list[Any]:
-        """Ids of the items of a stack, and the columns of its `OrderedTiles`."""
+    def read(self, stack: Stack) -> Any:
+        """Ids of the items of a stack, and its `OrderedTiles`."""
         with self._lock:
             if stack is not self._stack:
                 ordered = self._scene.items.tiles().ordered(stack, stack.covers, choosy=True)
-                self._columns, self._stack = list(map(np.ascontiguousarray, (stack.ids, *ordered))), stack
+                self._columns, self._stack = (stack.ids, tuple(map(np.ascontiguousarray, ordered))), stack
             return self._columns
 
 
@@ -217,20 +215,19 @@ class PositionCache:
             if visible_set is not None:
                 self._use_visible(visible_set, stack)
                 return
-            worth = max(int(visible_ns(stack, COMPILED)), 1)
             bounds = self._scene.bounds or EVERYWHERE
             kept = filter_columns(self._view) if self._view.may_refuse(stack) else ACCEPT_ALL
             self.tiles = _shot_tiles(
-                *self._ground.read(stack), *NOWHERE_NEAR, self._view.pierce, tuple(bounds), *kept, worth
-            )
+                *self._ground.read(stack), NOWHERE_NEAR, self._view.pierce, tuple(bounds), *kept,
+                visible_ns(stack, COMPILED),
+            )  # fmt: skip
             self._is_visible = False
 
     def _use_visible(self, visible_set: VisibleSet, stack: Stack) -> None:
         """Let shots look up the visible set; its tiles do not overlap and lie within the bounds."""
-        cells = visible_set.cells(self._reach)
-        columns = map(np.ascontiguousarray, (stack.ids, *visible_set.seen))
-        lists = tuple(cells[:5]), np.ascontiguousarray(cells.begin), np.ascontiguousarray(cells.listed)
-        self.tiles, self._is_visible = _shot_tiles(*columns, *lists, True, EVERYWHERE, *ACCEPT_ALL, 0), True
+        cells, seen = tuple(visible_set.cells(self._reach)), tuple(map(np.ascontiguousarray, visible_set.seen))
+        self.tiles = _shot_tiles(stack.ids, seen, cells, True, EVERYWHERE, *ACCEPT_ALL, 0.0)
+        self._is_visible = True
 
     def make_visible(self) -> None:
         """Make the visible set, if no other thread has made it."""
@@ -280,7 +277,7 @@ def _shape_of(fired: Round) -> Any:
     """The Shape of a round."""
     bits, alone = fired.pattern.bits, (ZERO, ZERO)
     pellets = alone if fired.pellets_xy is None else fired.pellets_xy.T
-    return _shape(bits.box_xyxy, bits.first, bits.rows, bits.words, bits.sums, bits.first_sum, *pellets)
+    return _shape(tuple(bits._replace(strips=NO_STRIPS)), *pellets)
 
 
 @structref.register
@@ -289,22 +286,16 @@ class TargetsType(types.StructRef):
 
 
 class Targets(structref.StructRefProxy):
-    """What single rays are cast at, in kernels: columns of the items, the bounds, and the filter as in `ShotTiles`.
-
-    `grid` and `none` stand for cells; they have the types of a batch, for which `follow` is compiled.
-    """
+    """What single rays are cast at, in kernels: columns of the items, the bounds, and the filter as in `ShotTiles`."""
 
 
-OF_TARGETS = [
-    ("box", BOXES), ("offset", INTS), ("masks", FLAGS), ("occluder", FLAGS), ("categories", INTS), ("owner", INTS),
-    ("bounds", BOUNDS), ("grid", GRID), ("none", INTS), ("meets", INTS), ("exclude", OWNERS),
-]  # fmt: skip
+OF_TARGETS = [("items", cast.ITEMS), ("bounds", cast.BOUNDS), ("meets", INTS), ("exclude", OWNERS)]
 TARGETS = struct_of(Targets, TargetsType, OF_TARGETS)
 
 
 @compiled(TARGETS(*[of for _, of in OF_TARGETS]))
-def _targets(box, offset, masks, occluder, categories, owner, bounds, grid, none, meets, exclude):
-    return Targets(box, offset, masks, occluder, categories, owner, bounds, grid, none, meets, exclude)
+def _targets(items, bounds, meets, exclude):
+    return Targets(items, bounds, meets, exclude)
 
 
 @compiled(types.UniTuple(types.int64, 7)(*[types.int64] * 8, TARGETS, ROWS_OUT), nogil=False)
@@ -313,14 +304,12 @@ def _one_ray(x, y, dx, dy, radius, side, wide_side, most, targets, others):
 
     The other objects that it hits are written to columns with the same five numbers.
     """
-    none, room = targets.none, len(targets.box) + 1
-    items = targets.box, targets.offset, targets.masks, targets.occluder, targets.categories, targets.owner
-    cells = targets.grid, none, none
+    items, room = targets.items, len(targets.items[0]) + 1
     near, found = np.empty(room, np.int64), np.empty((cast.COLUMNS, room), np.int64)
     wide, ends = (radius, side, wide_side, dx * dx + dy * dy), np.empty((6, 1), np.int64)
     origin_x, origin_y, first = (x + HALF) >> 8, (y + HALF) >> 8, (-1, 0, 0, 0, 0)
     count = follow(
-        np.int64(0), x, y, dx, dy, wide, items, cells, targets.bounds, most, targets.meets, targets.exclude,
+        np.int64(0), x, y, dx, dy, wide, items, NOWHERE, targets.bounds, most, targets.meets, targets.exclude,
         near, found, ends,
     )  # fmt: skip
     for i in range(count):
@@ -342,9 +331,8 @@ def follower(stack: Stack, bounds: Box | None, view: View, radius: int, most: in
     """See `rays.one_ray.follower`."""
     items = stack.box_xyxy, stack.offset, stack.masks, stack.occluder, stack.categories, stack.owner
     accepts = filter_columns(view) if view.may_refuse(stack) else ACCEPT_ALL
-    targets = _targets(
-        *map(np.ascontiguousarray, items), EVERYWHERE if bounds is None else tuple(bounds), *NOWHERE[:2], *accepts
-    )
+    within = EVERYWHERE if bounds is None else tuple(bounds)
+    targets = _targets(tuple(map(np.ascontiguousarray, items)), within, *accepts)
     room, limit = (len(stack) if most is None else min(most, len(stack))) - 1, most or 0
     none = np.empty((5, 0), np.int64)
 
