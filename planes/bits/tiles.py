@@ -268,8 +268,8 @@ class BigTiles(dict[int, int]):
 STRIDE = 3 * WORD
 """Words from one tile to the next: 64 rows of pixels, with 64 empty rows before and after."""
 
-ATLAS_SLACK = 1024
-"""Unused tiles that an atlas may keep, beyond as many as are in use."""
+ATLAS_SLACK = 4096
+"""Unused tiles that an atlas may keep, 6 MB, beyond as many as are in use."""
 
 STRIDES_MOST = 8
 """Most strides for which tiles are kept as integers."""
@@ -480,7 +480,7 @@ class Ground(NamedTuple):
 
 def tiles_in(stack: Stack) -> int:
     """About how many tiles the masks of a stack have: one each, or as many as cover them, if masks are large."""
-    return max(len(stack), int(stack.numbers[-1]) // WORD**2)
+    return max(len(stack), stack.area // WORD**2)
 
 
 def visible_ns(stack: Stack, now: costs.Costs) -> float:

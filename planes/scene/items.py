@@ -6,7 +6,7 @@ import itertools
 import threading
 from collections import deque
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from struct import Struct
 from typing import TYPE_CHECKING, Any
@@ -58,6 +58,14 @@ class Stack:
         stack = object.__new__(Stack)
         vars(stack).update(vars(self), box_xyxy=box_xyxy)
         vars(stack).pop("sizes", None)
+        return stack
+
+    def reformed(self, **columns: Any) -> Stack:
+        """A stack of the same items in the same order with other looks; what follows from the order is shared."""
+        stack = self.placed(columns["box_xyxy"])
+        for name in ("has_unmet", "width", "area", "numbers", "mean_wh"):
+            vars(stack).pop(name, None)
+        vars(stack).update(columns)
         return stack
 
     def __len__(self) -> int:
@@ -113,6 +121,11 @@ class Stack:
     def width(self) -> Ints:
         """Width of each mask, px."""
         return self.box_xyxy[:, 2] - self.box_xyxy[:, 0] + 1
+
+    @cached_property
+    def area(self) -> int:
+        """Pixels of all boxes."""
+        return int((self.width * (self.box_xyxy[:, 3] - self.box_xyxy[:, 1] + 1)).sum())
 
     @cached_property
     def numbers(self) -> Ints:
@@ -493,8 +506,8 @@ class Items:
         if last is None or not self._in_order:
             return self.stack_of(*DECIDING)
         rows = last.rows
-        return replace(
-            last, forms=self.arrangement, box_xyxy=self._boxes_in_order(rows), offset=self.offset.take(rows),
+        return last.reformed(
+            forms=self.arrangement, box_xyxy=self._boxes_in_order(rows), offset=self.offset.take(rows),
             masks=self.atlas.flat, categories=self._filtered_by(rows, last.occluder), owner=self.owner.take(rows),
         )  # fmt: skip
 
