@@ -30,7 +30,8 @@ def told(stack: Stack) -> list[Any]:
 def worked_out(stack: Stack) -> list[Any]:
     """What a stack works out of its columns, and keeps."""
     sizes = [size.tolist() for size in stack.sizes] if len(stack) else []
-    return [stack.has_unmet, stack.has_occluders, stack.width.tolist(), sizes]
+    numbers = stack.numbers.tolist(), stack.rank_by_label.tolist(), stack.is_object.tolist()
+    return [stack.has_unmet, stack.has_occluders, stack.width.tolist(), stack.area, numbers, sizes]
 
 
 def said_of(scene: Scene) -> list[Any]:
