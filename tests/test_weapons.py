@@ -7,6 +7,7 @@ import gc
 import json
 import math
 import pickle
+import sys
 import tracemalloc
 from collections.abc import Callable, Iterator
 from fractions import Fraction
@@ -47,6 +48,7 @@ from hitplanes.planes.bits import tiles
 from hitplanes.planes.common.backend import LruCache
 from hitplanes.planes.grid.fixed_point import ONE, unit
 from hitplanes.planes.grid.spans import Spans
+from hitplanes.planes.scene.sprite import rows_of
 from hitplanes.weapons.fire import prefilter as narrow
 from hitplanes.weapons.kinds import areas
 from hitplanes.weapons.kinds import weapon as windows
@@ -173,6 +175,20 @@ def test_a_stencil_fired_toward_a_point_is_turned_by_the_same_rule(
     angle = math.degrees(math.atan2(y, x))
     assume((x or y) and oracle_raster.unit(angle) == oracle_raster.unit_toward(x, y))
     assert fired_pixels(Stencil(mask, pivot), toward=(x / 256, y / 256)) == turned_pixels(mask, pivot, angle)
+
+
+def test_a_stencil_is_made_without_a_step_of_python_for_each_pixel() -> None:
+    """As are masks of nested lists and of rows of '#' and '.'."""
+    mask = np.hypot(*np.indices((128, 128)) - 64) < 60
+    steps: list[str] = []
+    sys.setprofile(lambda _, event, what: steps.append(event))
+    stencils = [Stencil(given) for given in (mask, mask.tolist(), rows_of(mask))]
+    reaches = [stencil.reach_256 for stencil in stencils]
+    sys.setprofile(None)
+    assert len(steps) < mask.size
+    assert {stencil.mask for stencil in stencils} == {tuple(rows_of(mask))}
+    farthest = max((x - 63) ** 2 + (y - 63) ** 2 for y, x in np.argwhere(mask).tolist())
+    assert set(reaches) == {isqrt(256**2 * farthest - 1) + 1}
 
 
 def test_arrays_are_taken_and_left_as_they_were() -> None:

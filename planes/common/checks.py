@@ -241,11 +241,11 @@ def _numeric(field: str, values: object, shape: Shape, kinds: str) -> npt.NDArra
 
 
 def _plain(values: object) -> bool:
-    """Whether nested lists hold nothing but Python's own numbers."""
+    """Whether nested lists hold nothing but Python's own numbers, or nothing but its booleans."""
     level: list[Any] = [values]
     while (kinds := set(map(type, level))) and kinds <= {list, tuple}:
         level = list(itertools.chain.from_iterable(level))
-    return kinds <= {int, float}
+    return kinds <= {int, float} or kinds == {bool}
 
 
 def _refuse_changed(field: str, values: object, booleans: bool) -> None:

@@ -14,6 +14,8 @@ from dataclasses import dataclass
 from pathlib import PurePosixPath
 from typing import Any, Protocol
 
+import numpy as np
+
 from .checks import InputError, array_of, bools, choice, flag, integer, integers, real, reals, shown, within
 from .limits import MASK_SIDE_MAX
 
@@ -176,11 +178,12 @@ class Mask:
             if array.ndim == 2 and not 1 <= min(array.shape) <= max(array.shape) <= MASK_SIDE_MAX:
                 got = f"{array.shape[1]} x {array.shape[0]}"
                 raise InputError(f"{name}: expected a mask of sides of 1 to {MASK_SIDE_MAX} px, got {got}")
-            return bools(name, value, (None, None))
+            return bools(name, array, (None, None))
         for i, row in enumerate(value):
             if not isinstance(row, str) or len(row) != len(value[0]) or set(row) - set("#."):
                 raise InputError(f"{name}[{i}]: expected {len(value[0])} of '#' and '.', got {shown(row)}")
-        return self.check(name, [[v == "#" for v in row] for row in value])
+        signs = np.frombuffer("".join(value).encode("ascii"), np.uint8).reshape(len(value), len(value[0]))
+        return self.check(name, signs == ord("#"))
 
 
 @dataclass(frozen=True)

@@ -295,7 +295,7 @@ def as_sprite(value: object) -> Sprite:
 
 def rows_of(mask: Bools) -> list[str]:
     """A mask as rows of '#' and '.', the form of scene files."""
-    return ["".join("#" if v else "." for v in row) for row in mask.tolist()]
+    return [row.tobytes().decode("ascii") for row in np.where(mask, np.uint8(ord("#")), np.uint8(ord(".")))]
 
 
 def size_of(rings: Sequence[Ints]) -> tuple[int, int]:

@@ -547,9 +547,9 @@ def _snapped(length: float) -> int:
 
 
 def _farthest(points_256: Ints) -> int:
-    if not len(points_256):
-        return 0
-    return max(math.isqrt(x * x + y * y - 1) + 1 if x or y else 0 for x, y in points_256.tolist())
+    """Distance of the farthest point from the origin, rounded up."""
+    square = int((points_256 * points_256).sum(axis=1).max(initial=0))
+    return math.isqrt(square - 1) + 1 if square else 0
 
 
 def check_aimed(weapon: Weapon, offset: Ints | None) -> None:
