@@ -164,8 +164,8 @@ SCENES: dict[str, tuple[Any, str]] = {
     "weapon, text": (changed(GUN, "disc"), r"weapons\.gun: expected an object with a kind, got 'disc'"),
     "weapon's kind": (changed(f"{GUN}.kind", "dsc"), r"weapons\.gun: kind: .*got 'dsc' .did you mean 'disc'"),
     "weapon's key": (changed(f"{GUN}.radus", 2), r"weapons\.gun: key: .*got 'radus' .did you mean 'radius'"),
-    "weapon's field, text": (changed(f"{GUN}.radius", "2"), r"weapons\.gun: radius: expected numbers, got '2'"),
-    "weapon's field, true": (changed(f"{GUN}.radius", True), r"weapons\.gun: radius: expected numbers, got True"),
+    "weapon's field, text": (changed(f"{GUN}.radius", "2"), r"weapons\.gun: radius: expected a number, got '2'"),
+    "weapon's field, true": (changed(f"{GUN}.radius", True), r"weapons\.gun: radius: expected a number, got True"),
     "weapon's field, 10^9": (changed(f"{GUN}.radius", 10**9), r"weapons\.gun: radius: expected .*got 1000000000"),
     "weapon's field, missing": (
         changed(f"{GUN}.radius", MISSING), r"weapons\.gun: radius: expected a value, got nothing"),
@@ -178,7 +178,7 @@ SCENES: dict[str, tuple[Any, str]] = {
     "shot's weapon": (changed(f"{SHOT}.weapon", "gum"), r"shots\[0\]: weapon: .*got 'gum' .did you mean 'gun'"),
     "shot with true": (changed(f"{SHOT}.at", [True, 2]), r"shots\[0\]: at\[0\]: expected a number like .*got True"),
     "shot at three": (changed(f"{SHOT}.at", [1, 2, 3]), r"shots\[0\]: at: expected shape \(2,\), got \(3,\)"),
-    "shot's aim, true": (changed(f"{SHOT}.aim", True), r"shots\[0\]: aim: expected numbers, got True"),
+    "shot's aim, true": (changed(f"{SHOT}.aim", True), r"shots\[0\]: aim: expected a number, got True"),
     "shot's accept, text": (changed(f"{SHOT}.accept", "target"), r"shots\[0\]: accept: expected a list, got 'target'"),
     "shot's accept": (changed(f"{SHOT}.accept", ["targe"]), r"shots\[0\]: .*got 'targe' .did you mean 'target'"),
     "shot's exclude": (

@@ -108,6 +108,7 @@ masked = np.ma.array([[1.0, 2.0], [3.0, 4.0]], mask=[[0, 0], [0, 1]])
 ARRAYS: dict[str, tuple[Any, str]] = {
     "None": (None, "at: expected numbers, got None"),
     "text": ("12", "at: expected numbers, got '12'"),
+    "a text among numbers": ([1, "x"], r"at: expected numbers, got \[1, 'x'\]"),
     "bytes": (b"12", "at: expected numbers, got b'12'"),
     "object": (Thing(), "at: expected numbers, got <"),
     "dict": ({"x": 1, "y": 2}, r"at: expected numbers, got \{'x': 1, 'y': 2\}"),
@@ -191,7 +192,7 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
         lambda: world().move([0, 1], [[1, 2], [3]]), r"xy: expected an array with rows of one length, got"),
     "role": (lambda: world().add(Sprite.circle(1), role="ocluder"), "role: .*got 'ocluder' .did you mean 'occluder'"),
     "role, number": (lambda: world().add(Sprite.circle(1), role=3), "role: expected one of .*got 3"),
-    "angle, text": (lambda: world().add(Sprite.circle(1), angle="90"), "angle: expected numbers, got '90'"),
+    "angle, text": (lambda: world().add(Sprite.circle(1), angle="90"), "angle: expected a number, got '90'"),
     "scale, three": (
         lambda: world().add(Sprite.circle(1), scale=(1, 2, 3)), r"scale: expected shape \(2,\), got \(3,\)"),
     "scale, zero": (lambda: world().add(Sprite.circle(1), scale=0), r"scale\[0\]: expected a number from 0.00390625"),
@@ -224,7 +225,7 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
     "ids, removed": (lambda: world().remove([0, 2]), r"ids\[1\]: expected an object in the scene, got 2, which was re"),
     "ids, twice": (lambda: world().remove([0, 1, 0]), r"ids\[2\]: expected each object once, got 0 again"),
     "ids, booleans": (lambda: world().remove([True, False]), r"ids: expected numbers, got \[True, False\]"),
-    "ids, a name": (lambda: world().remove("duck"), r"ids: expected numbers, got \['duck'\]"),
+    "ids, a name": (lambda: world().remove("duck"), r"ids: expected ids, got .duck.: scene\.find\(name\) is"),
     "ids, masked": (lambda: world().remove(np.ma.array([0, 1], mask=[0, 1])), r"ids\[1\]: expected a value, got a m"),
     "ids, two dimensions": (lambda: world().remove([[0, 1]]), r"ids: expected shape \(any,\), got \(1, 2\)"),
     "ids, float16 NaN": (lambda: world().remove(np.array([0, np.nan], np.float16)), r"ids\[1\]: expected a whole"),
@@ -327,9 +328,9 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
     "ring inside out": (lambda: Ring(5, 3), "inner_radius: expected at most 3.0, got 5.0"),
     "box weapon of half a pixel": (
         lambda: Box(2.5, 3), "width: expected a whole number from 1 .*got 2.5"),  # type: ignore[arg-type]
-    "radius, text": (lambda: Disc("3"), "radius: expected numbers, got '3'"),  # type: ignore[arg-type]
+    "radius, text": (lambda: Disc("3"), "radius: expected a number, got '3'"),  # type: ignore[arg-type]
     "radius, list": (lambda: Disc([3]), r"radius: expected shape \(\), got \(1,\)"),  # type: ignore[arg-type]
-    "radius, true": (lambda: Disc(True), "radius: expected numbers, got True"),
+    "radius, true": (lambda: Disc(True), "radius: expected a number, got True"),
     "radius, masked": (
         lambda: Disc(np.ma.masked), "radius: expected a value, got a masked one"),  # type: ignore[arg-type]
     "polygon weapon with true": (lambda: Polygon([*TRIANGLE, (True, 2)]), r"points\[3\]\[0\]: .*got True"),
@@ -363,7 +364,7 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
     # fire
     "fire at no scene": (
         lambda: fire(None, Disc(1), (0, 0)), "scene: expected a Scene or a History, got NoneType"),  # type: ignore[arg-type]
-    "fire no weapon": (lambda: shot(weapon="disc"), "weapon: expected a weapon, got str"),
+    "fire no weapon": (lambda: shot(weapon="disc"), r"weapon: expected a weapon, got str: weapons_of\(scene\) has"),
     "fire a class": (lambda: shot(weapon=Disc), "weapon: expected a weapon, got the class Disc"),
     "prepare at a class": (lambda: prepare(Scene, Disc(1)), "scene: expected a Scene, got the class Scene"),
     "history of a class": (lambda: History(Scene), "scene: expected a Scene, got the class Scene"),
@@ -382,7 +383,7 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
     "accept, a name": (lambda: shot(accept="taget"), "accept: .*got 'taget' .did you mean 'target'"),
     "accept, unknown name": (lambda: shot(accept=["taget"]), "accept: .*got 'taget' .did you mean 'target'"),
     "exclude, -2": (lambda: shot(exclude=[0, -2]), r"exclude\[0\]\[1\]: expected a whole number from -1 .*got -2"),
-    "exclude, a name": (lambda: shot(exclude=["duck"]), r"exclude: expected numbers, got \[\['duck'\]\]"),
+    "exclude, a name": (lambda: shot(exclude=["duck"]), r"exclude: expected ids, got \['duck'\]: scene.find"),
     "exclude, true": (lambda: shot(exclude=True), r"exclude: expected numbers, got .*True"),
     "exclude, three dimensions": (lambda: shot(exclude=np.zeros((1, 1, 1))), r"exclude: expected shape \(1, any\)"),
     "seed, text": (lambda: shot(seed="7"), "seed: expected a whole number .*got '7'"),

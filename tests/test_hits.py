@@ -763,7 +763,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"exclude": [1, 2, 3]}, "exclude: expected an owner for each of 2 shots, .* got shape .3"),
     ({"exclude": [[0], [0.5]]}, r"exclude\[1\]\[0\]: expected a whole number"),
     ({"exclude": -2}, r"exclude\[0\]\[0\]: expected a whole number from -1"),
-    ({"exclude": "me"}, r"exclude: expected numbers"),
+    ({"exclude": "me"}, "exclude: expected ids, got 'me': scene.find"),
     ({"seed": -1}, r"seed: expected a whole number"),
     ({"seed": 2**64}, r"seed: expected a whole number"),
     ({"seed": 1.5}, r"seed: expected a whole number"),

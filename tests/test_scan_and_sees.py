@@ -400,7 +400,7 @@ NONSENSE: list[tuple[Any, str]] = [
     (lambda s: scan(s, HERE, 3, 5), r"angles: expected a list of them, one for each beam, got 3"),
     (lambda s: scan(s, [HERE] * 2, [AIMS] * 3, 5), r"angles: expected shape \(2, any\), got \(3, 4\)"),
     (lambda s: scan(s, HERE, [0, math.nan], 5), r"angles\[1\]: expected a finite number, got nan"),
-    (lambda s: scan(s, HERE, AIMS, None), "range: expected numbers, got None"),
+    (lambda s: scan(s, HERE, AIMS, None), "range: expected a number, got None"),
     (lambda s: scan(s, HERE, AIMS, -1), "range: expected a number from 0 to 1048576, got -1"),
     (lambda s: scan(s, HERE, AIMS, 2**20 + 1), "range: expected a number from 0 to 1048576, got 1048577"),
 ]

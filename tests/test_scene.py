@@ -404,7 +404,7 @@ def test_a_change_of_no_objects_is_no_error() -> None:
         ({"position_xy": (1, [2])}, "position_xy: expected"),
         ({"position_xy": (1, 2, 3)}, r"position_xy: expected shape \(2,\), got \(3,\)"),
         ({"position_xy": (np.nan, 2)}, r"position_xy\[0\]: expected a finite number"),
-        ({"angle": "up"}, "angle: expected numbers"),
+        ({"angle": "up"}, "angle: expected a number"),
         ({"angle": [1, 2]}, r"angle: expected shape \(\)"),
         ({"scale": (1, 2, 3)}, r"scale: expected shape \(2,\)"),
         ({"scale": (1, [2])}, "scale: expected"),

@@ -607,7 +607,7 @@ def test_a_sprite_keeps_what_it_was_given() -> None:
         (lambda: Sprite.from_mask(MASK, angle_step=0), "angle_step: expected a number from 0.0054.* to 360, got 0"),
         (lambda: Sprite.box(3, 1, angle_step=math.nan), "angle_step: expected a finite number"),
         (lambda: Sprite.circle(-1), "radius: expected a number from 0 to 32768, got -1"),
-        (lambda: Sprite.circle("3"), "radius: expected numbers"),  # type: ignore[arg-type]
+        (lambda: Sprite.circle("3"), "radius: expected a number"),  # type: ignore[arg-type]
         (lambda: Sprite.box(1, -1), "height: expected a number from 0"),
         (lambda: posed(as_sprite(MASK), flip="left"), "flip: expected one of 'none', 'x', 'y', 'xy', got 'left'"),
         (lambda: posed(as_sprite(MASK), frame=1), "frame: .*from 0 to 0, got 1"),

@@ -251,7 +251,7 @@ BAD: list[tuple[Any, str]] = [
     ({"kind": "disk", "radius": 3}, "did you mean 'disc'?"),
     ({"kind": "disc"}, "radius: expected a value, got nothing"),
     ({**DISC, "radios": 3}, "key: expected one of"),
-    ({**DISC, "radius": "3"}, "radius: expected numbers"),
+    ({**DISC, "radius": "3"}, "radius: expected a number, got '3'"),
     ({**DISC, "radius": [3]}, "radius: expected shape ()"),
     ({**DISC, "radius": -1}, "radius: expected a number from 0"),
     ({**DISC, "radius": float("nan")}, "radius: expected a finite number"),

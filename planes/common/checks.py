@@ -99,6 +99,14 @@ def integers(field: str, values: object, shape: Shape, low: int, high: int) -> I
     return array.astype(np.int64)
 
 
+def ids_of(field: str, values: object) -> npt.NDArray[Any]:
+    """Convert ids of objects like `array_of`; for names the error says how to get ids of them."""
+    array = array_of(field, values)
+    if array.dtype.kind == "U":
+        raise InputError(f"{field}: expected ids, got {shown(values)}: scene.find(name) is the id of an object")
+    return array
+
+
 def rising(array: Ints, count: int) -> bool:
     """Whether an array (n,) is strictly rising within 0 .. count - 1, and so has no number twice."""
     if not len(array):
@@ -231,8 +239,9 @@ def _numeric(field: str, values: object, shape: Shape, kinds: str) -> npt.NDArra
     array = array_of(field, values, shape)
     empty = not array.size and array.dtype.kind == "f"  # numpy makes an empty list an array of floats
     if array.dtype.kind not in kinds and not empty:
-        kind = "booleans" if kinds.startswith("b") else "numbers"
-        raise InputError(f"{field}: expected {kind}, got {shown(array.tolist() if array.size <= SHOWN else array)}")
+        kind = "booleans" if kinds.startswith("b") else "numbers" if shape else "a number"
+        given = values if (array.dtype.kind in "US" and array is not values) or array.size > SHOWN else array.tolist()
+        raise InputError(f"{field}: expected {kind}, got {shown(given)}")
     if array.shape == (0,) and shape[1:] and shape[0] in (None, 0) and None not in shape[1:]:
         array = array.reshape(0, *shape[1:])  # an empty list of points
     if len(array.shape) != len(shape) or any(e not in (None, g) for e, g in zip(shape, array.shape, strict=True)):

@@ -20,6 +20,7 @@ from ..common.checks import (
     array_of,
     choice,
     each,
+    ids_of,
     integer,
     integers,
     listed,
@@ -492,7 +493,7 @@ class Scene:
         table = self._items.table
         if isinstance(ids, int | np.integer) and type(ids) is not bool and ids in self:
             return np.array([table.row(int(ids))])
-        given = integers("ids", np.atleast_1d(array_of("ids", ids)), (None,), 0, table.count - 1)
+        given = integers("ids", np.atleast_1d(ids_of("ids", ids)), (None,), 0, table.count - 1)
         rows = table.rows(given)
         gone = np.flatnonzero(rows < 0)
         if len(gone):

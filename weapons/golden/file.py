@@ -77,9 +77,10 @@ class Tolerance:
 
     def exceeded(self, was: Entry, now: Entry) -> list[str]:
         """What exceeds it in two rows of one object, and by how much; empty if nothing does."""
-        count = abs(now["pixels"] - was["pixels"])
+        more = now["pixels"] - was["pixels"]
         far2 = sum((to - at) ** 2 for to, at in zip(now["first_xy"], was["first_xy"], strict=True))
-        lines = [f"{count} px more or less, tolerance_pixels={self.pixels}"] if count > self.pixels else []
+        count = f"{abs(more)} px {'more' if more > 0 else 'less'}, tolerance_pixels={self.pixels}"
+        lines = [count] if abs(more) > self.pixels else []
         return lines + ([f"first hit {far2**0.5:.1f} px away, tolerance_px={self.px}"] if far2 > self.px**2 else [])
 
 

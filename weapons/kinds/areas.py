@@ -409,7 +409,8 @@ def parts_of(weapon: Weapon) -> tuple[Rounds[Any] | None, Spread[Any] | None, Ar
     """Burst, spread and pattern of an area weapon."""
     parts = _parts_of(weapon)[0]
     if parts is None:
-        raise InputError(f"weapon: expected a weapon, got {kind_of(weapon)}")
+        hint = ": weapons_of(scene) has those of a scene by name" if isinstance(weapon, str | dict) else ""
+        raise InputError(f"weapon: expected a weapon, got {kind_of(weapon)}{hint}")
     return parts
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from hitplanes.planes.bits.bit_rows import Words, row_order
 from hitplanes.planes.common.backend import cached_attribute, kernels_of
-from hitplanes.planes.common.checks import Floats, InputError, Ints, array_of, each, integer, integers, reals
+from hitplanes.planes.common.checks import Floats, InputError, Ints, array_of, each, ids_of, integer, integers, reals
 from hitplanes.planes.common.limits import ALL, CATEGORY_BITS, EVERYTHING, POSITION_MAX, SEED_MAX
 from hitplanes.planes.grid import fixed_point
 from hitplanes.planes.grid.fixed_point import ONE, Whole, pixel, snap, turned, unit, unit_of, unit_toward
@@ -502,7 +502,7 @@ def checked_owners(exclude: object, n: int, single: bool) -> Ints | tuple[int, .
         return (exclude,)
     if single and isinstance(exclude, tuple | list) and all(type(v) is int and -1 <= v <= OWNER_MAX for v in exclude):
         return tuple(exclude)
-    array = given = array_of("exclude", exclude)
+    array = given = ids_of("exclude", exclude)
     if array.ndim == 0:
         array = np.broadcast_to(array, (n, 1))
     elif array.ndim == 1:
@@ -511,7 +511,7 @@ def checked_owners(exclude: object, n: int, single: bool) -> Ints | tuple[int, .
         array = np.broadcast_to(array, (n, array.shape[1]))
     if len(array) != n:
         raise InputError(
-            f"exclude: expected an owner for each of {n} shots, or one list of them for all, [[1, 2]], "
+            f"exclude: expected an owner for each of {n} shots, or one list for all of them, as [[1, 2]], "
             f"got shape {given.shape}"
         )
     return integers("exclude", array, (n, None), -1, OWNER_MAX)
