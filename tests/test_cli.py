@@ -23,6 +23,7 @@ from hitplanes import (
     Rifle,
     ShotRecord,
     Spread,
+    Sprite,
     fire_shots,
     load_scene,
     picture_of_report,
@@ -532,6 +533,18 @@ def test_replay_tells_the_first_that_differs(match: Path, tmp_path: Path, capsys
     assert main(["replay", str(tmp_path / "range"), str(match)]) == 1
     told = capsys.readouterr().out
     assert re.fullmatch(rf"({match} line 2, shot 0: .*\n)+", told) and "scene: its content hash is" in told
+
+
+def test_replay_says_of_all_shots_that_they_do_the_same_at_another_scene(
+    match: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene = load_scene(GALLERY)
+    scene.add(Sprite.circle(1), (470, 10), name="far away")
+    scene.save(tmp_path / "other")
+    assert main(["replay", str(tmp_path / "other"), str(match)]) == 1
+    first, second = capsys.readouterr().out.splitlines()
+    assert first.startswith(f"{match} line 2, shot 0: scene: its content hash is ")
+    assert second == "all shots do the same again"
 
 
 def test_replay_tells_of_a_record_without_an_end(match: Path, capsys: pytest.CaptureFixture[str]) -> None:

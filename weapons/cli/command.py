@@ -536,14 +536,14 @@ def compare(arguments: argparse.Namespace) -> int:
 
 def replay(arguments: argparse.Namespace) -> int:
     """Print the first shot of a record whose result differs; return 1 if there is one."""
-    from ..replay.record import NO_END, replayed  # only this subcommand needs it
+    from ..replay.record import NO_END, SAME, replayed  # only this subcommand needs it
 
     found, endless = replayed(arguments.record, load_scene(arguments.scene))
     if found is None:
-        _say("all shots do the same again")
+        _say(SAME)
     else:
         for text in found.told:
-            _say(f"{arguments.record} line {found.line}, shot {found.shot}: {text}")
+            _say(text if text == SAME else f"{arguments.record} line {found.line}, shot {found.shot}: {text}")
     if endless:
         _say(f"note: {arguments.record} {NO_END}")
     return 0 if found is None else 1

@@ -83,6 +83,7 @@ LINE = Keys(COLUMNS, tuple(name for name in COLUMNS if name not in ("tick", "tow
 
 AT_ONCE, BYTES_AT_ONCE = 1024, 2**21  # most shots, and about most bytes of lines, of one call; more are no faster
 
+SAME = "all shots do the same again"
 NO_END = "has no end: it was not closed, as after a crash, and may lack shots"
 
 NUMBER_MAX = 2**63  # largest absolute value of a number in a result
@@ -441,7 +442,7 @@ def _first_difference(path: Path, groups: Iterator[list[Recorded]], scene: Any) 
         texts: list[str] = []
         if (found := hashes.of(present)) != first["scene"]:
             texts = [f"scene: its content hash is {found}, was {first['scene']}{_at_tick(scene, first.get('tick'))}"]
-            changed = changed or Difference(line, first["shot"], (*texts, "all shots do the same again"))
+            changed = changed or Difference(line, first["shot"], (*texts, SAME))
         for entry, result in zip(group, _results(path, present, group), strict=True):
             if result != entry.data["result"]:
                 texts += first_of(_result_lines(present, entry.data["result"], result))
