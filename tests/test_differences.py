@@ -285,6 +285,18 @@ def test_a_change_that_only_samples_show_is_told() -> None:
     assert any("occluded samples: gained at " in line and "lost at " in line for line in lines)
 
 
+def test_words_about_what_rays_passed_by() -> None:
+    near, moved, away, bare = game(duck=(250, 100)), game(duck=(250, 102)), game(duck=(20, 198)), game()
+    bare.remove(bare.ids("hittable"))
+    reports = [told(scene, Pistol(90), (200, 40), aim=0) for scene in (near, moved, away)]
+    here = "shot 0 (pistol at 200, 40): nearest miss: "
+    assert differences(*reports[:2]) == [f'{here}object 0 "duck" by 49.5 px, was 47.5 px']
+    assert differences(*reports[1:]) == [f'{here}object 1 "bandit" by 69.5 px, was object 0 "duck" by 49.5 px']
+    assert f'{here}none, was object 1 "bandit" by 69.5 px' in differences(
+        reports[2], told(bare, Pistol(90), (200, 40), aim=0)
+    )
+
+
 def test_words_about_rays() -> None:
     """Where they stopped and why, what they went through: by their pellets where there are several."""
     near, far = game(duck=(250, 180)), game(duck=(250, 180))

@@ -150,6 +150,19 @@ def _stop(was: Entry, now: Entry) -> list[str] | None:
     return [f"stopped {place + ', ' if place else 'after '}{far} ({why}), was {', '.join(before)}{reason}"]
 
 
+def _nearest_miss(was: Entry, now: Entry) -> list[str] | None:
+    """Line about the object that was passed by most closely; None if it would read the same."""
+    before, after = was["nearest_miss"], now["nearest_miss"]
+    if not all(miss is None or isinstance(miss, dict) for miss in (before, after)):
+        return None
+    old, new = ("none" if miss is None else f"{_name(miss)} by {_px(miss.get('distance'))}" for miss in (before, after))
+    if old == new:
+        return None
+    if before and after and _name(before) == _name(after):
+        old = _px(before.get("distance"))
+    return [f"nearest miss: {new}, was {old}"]
+
+
 def _passes(was: Entry, now: Entry) -> list[str] | None:
     lines = []
     for entry, before, after in pairs(was["passes"], now["passes"], "object"):
@@ -276,7 +289,7 @@ def _shot(was: Entry, now: Entry) -> list[str]:
     words: dict[str, Words] = {
         "at": lambda was, now: [f"fired at {_place(now['at'])}, was {_place(was['at'])}"],
         "rows": _rows, "blockers": _blockers, "why_not": _why_not, "verdicts": _verdicts, "rays": _rays,
-        "samples": _samples,
+        "samples": _samples, "nearest_miss": _nearest_miss,
     }  # fmt: skip
     return _lines_of(_chief(was), _chief(now), words) or _lines_of(was, now, words)
 
