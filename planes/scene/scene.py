@@ -507,11 +507,11 @@ class Scene:
         if risen is not None:
             return risen
         rows = self._living(ids)
-        if len(rows) > 1:
+        ordered = np.sort(rows)
+        if (ordered[1:] == ordered[:-1]).any():
             again = np.setdiff1d(np.arange(len(rows)), np.unique(rows, return_index=True)[1])
-            if len(again):
-                item = self._items.id[rows[again[0]]]
-                raise InputError(f"ids[{again[0]}]: expected each object once, got {item} again")
+            item = self._items.id[rows[again[0]]]
+            raise InputError(f"ids[{again[0]}]: expected each object once, got {item} again")
         return rows
 
     def _bits(self, categories: object, default: int) -> int:
