@@ -275,7 +275,7 @@ def test_new_makes_a_scene_that_reports_hits_occluded_and_missed(
     assert cv2.imread("report.png").std() > 20
     Path("shots.jsonl").write_text('{"weapon": "point", "at": [88, 60]}\n')
     assert main(["fire", "my range", "shots.jsonl"]) == 0
-    assert capsys.readouterr().out.endswith("1 shots, 1 hit something, in hits.jsonl\n")
+    assert capsys.readouterr().out.endswith("1 shot, 1 hit something, in hits.jsonl\n")
 
 
 def sprite_png(path: Path, rows: list[str], alpha: dict[str, int]) -> Path:

@@ -424,7 +424,7 @@ def fire(arguments: argparse.Namespace) -> None:
     with within(str(scene_folder(arguments.scene) / FILE_NAME)):
         weapons_of(scene)
     done = fire_log(scene, arguments.shots, arguments.output, Progress(sys.stderr))
-    _say(f"{done.shots} shots, {done.hit} hit something, in {arguments.output}")
+    _say(f"{done.shots} shot{'' if done.shots == 1 else 's'}, {done.hit} hit something, in {arguments.output}")
     if arguments.plan:
         _print_plan(done.plan.timed(), done.plan.calls)
 
