@@ -15,7 +15,6 @@ from ..grid.rasterize import DIAGONAL, FAR, Lines
 from ..grid.spans import Box
 from ..scene.items import Stack
 from .areas import CELLS, NOBODY, NONE, OWNERS, refuses
-from .areas import NOWHERE as NO_CELLS
 from .bit_rows import BOXES, EVERYWHERE, FLAGS, INTS, ROWS_OUT, cell_at, meets_any, rows_by
 from .cache import compiled, helper
 from .planes import (
@@ -49,7 +48,7 @@ LISTED = 4096 * SUB
 FARTHEST, LONG = 2**29, 2**50
 """Longest ray of which sums of products fit int64, 1/256 px, and squared length below which those of `share` do."""
 
-NOWHERE = tuple(NO_CELLS)
+NOWHERE = 0, 0, 0, 0, 0, NONE, NONE
 """Cells that list no items: all boxes are compared."""
 
 SORTED = 32

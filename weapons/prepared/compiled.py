@@ -71,8 +71,6 @@ ROW_BYTES, OUT = 8 * ROW, (Y + 1) * FEW_ROWS
 read = struct.Struct("8q").unpack_from
 NO_STRIPS, ZERO = np.zeros((0, 4), np.int64), np.zeros(1, np.int64)
 ACCEPT_ALL = NO_NUMBERS, NOBODY
-NOWHERE_NEAR = 0, 0, 0, 0, 0, NO_NUMBERS, NO_NUMBERS
-"""Cells of shots that walk all tiles."""
 
 
 @structref.register
@@ -218,7 +216,7 @@ class PositionCache:
             bounds = self._scene.bounds or EVERYWHERE
             kept = filter_columns(self._view) if self._view.may_refuse(stack) else ACCEPT_ALL
             self.tiles = _shot_tiles(
-                *self._ground.read(stack), NOWHERE_NEAR, self._view.pierce, tuple(bounds), *kept,
+                *self._ground.read(stack), NOWHERE, self._view.pierce, tuple(bounds), *kept,
                 visible_ns(stack, COMPILED),
             )  # fmt: skip
             self._is_visible = False
