@@ -156,3 +156,18 @@ def test_a_large_mask_counts_as_the_tiles_that_cover_it(jit: bool, made_sets: li
     shots = [(30 * x, 9) for x in range(50)]
     hits = [fire(scene, Disc(40), shots) for _ in range(200)]
     assert made_sets and hits[0] == hits[-1] == fire(scene, Disc(40), shots, strategy="spans")
+
+
+@pytest.mark.parametrize("objects", [10, 40])
+def test_many_wide_shots_at_few_objects_soon_see_what_is_visible(
+    jit: bool, objects: int, made_sets: list[View]
+) -> None:
+    """Tiles that lie near shots cost most, however few there are."""
+    rng = np.random.default_rng(objects)
+    scene = Scene((320, 320))
+    for place in rng.uniform(0, 320, (objects, 2)):
+        scene.add(Sprite.circle(8), place)
+    shots = rng.uniform(0, 320, (1000, 2))
+    for _ in range(5):
+        fire(scene, Disc(60), shots)
+    assert made_sets

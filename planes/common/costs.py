@@ -18,8 +18,10 @@ class Costs(NamedTuple):
     tiles_call: float  # by the tiles of the stack, front to back
     tiles_placement: float
     tiles_pair: float  # a placement and a tile
+    tiles_near: float  # a placement and a tile near it
     visible_call: float  # by the visible set
     visible_placement: float
+    visible_near: float  # a placement and a tile of the stack near it
     visible_made: float
     visible_tile: float  # made: each tile
     labels_call: float  # by the label plane
@@ -50,8 +52,8 @@ class Costs(NamedTuple):
 
 
 NUMPY = Costs(
-    tiles_call=143000, tiles_placement=82.3, tiles_pair=2.26,
-    visible_call=131000, visible_placement=112, visible_made=81900, visible_tile=1240,
+    tiles_call=146000, tiles_placement=57.6, tiles_pair=0.137, tiles_near=548,
+    visible_call=137000, visible_placement=107, visible_near=35.2, visible_made=81900, visible_tile=1240,
     labels_call=68400, labels_item=5840, labels_pixel=0.0442, labels_box=16800,
     integers_call=84400, integers_placement=232, integers_pair=1980, integers_bit=0.0756,
     box_pair=0.585, bvh_call=63700, bvh_placement=297, bvh_moved=887, bvh_item=433,
@@ -61,8 +63,8 @@ NUMPY = Costs(
     prepared_tile=inf, prepared_near=inf, thread=inf,
 )  # fmt: skip
 COMPILED = Costs(
-    tiles_call=54200, tiles_placement=33.9, tiles_pair=0.248,
-    visible_call=55400, visible_placement=40.9, visible_made=73900, visible_tile=1290,
+    tiles_call=54600, tiles_placement=41.1, tiles_pair=0.0151, tiles_near=45.6,
+    visible_call=56200, visible_placement=40.4, visible_near=7.95, visible_made=73900, visible_tile=1290,
     labels_call=37700, labels_item=333, labels_pixel=0.0426, labels_box=4960,
     integers_call=inf, integers_placement=inf, integers_pair=inf, integers_bit=inf,
     box_pair=0.572, bvh_call=62900, bvh_placement=314, bvh_moved=847, bvh_item=442,

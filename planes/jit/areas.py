@@ -47,7 +47,6 @@ from .cache import compiled, helper
 FEW = 4  # most placements that compare all tiles; for more, tiles are listed in cells of the world first
 CELL_BITS = 6  # least side of those cells, 2**CELL_BITS = 64 px; no tile is wider
 PAD = WORD  # empty rows before and after each column of words of a pattern, see `bits.bit_rows.PatternBits`
-LISTED = 50.0  # pairs of a placement and a tile that take as long as one that the placement's cell lists
 
 SUMS = types.Array(types.uint32, 1, "C", readonly=True)
 OWNERS = types.Array(types.int64, 2, "A", readonly=True)
@@ -486,6 +485,13 @@ NOBODY = np.zeros((1, 0), np.int64)
 NOWHERE = Cells(0, 0, 0, 0, 0, NONE, NONE)
 
 
+def _placement_ns(tiles: int, cells: Cells) -> float:
+    """Time of a placement that meets one of some tiles, or those that a cell lists, ns."""
+    if cells.wide:
+        return COMPILED.visible_placement + COMPILED.visible_near * len(cells.listed) / (len(cells.begin) - 1)
+    return COMPILED.tiles_placement + COMPILED.tiles_near + COMPILED.tiles_pair * tiles
+
+
 def front_to_back(
     placed: Placed,
     each: int,
@@ -499,8 +505,7 @@ def front_to_back(
     accepted = NONE if meets is None else np.array([meets]) if isinstance(meets, int) else meets
     found = None
     if rule.blockers is None and (near is None or isinstance(near, Cells)):
-        tiles_each = len(tiles.rank) if near is None else LISTED * len(cells.listed) / max(len(cells.begin) - 1, 1)
-        least = COMPILED.thread / (each * (COMPILED.tiles_placement + COMPILED.tiles_pair * tiles_each))
+        least = COMPILED.thread / (each * _placement_ns(len(tiles.rank), cells))
         found = rows_by(
             match, Y + 1, len(placed.origin_x), least, tuple(placed), tuple(windows), tuple(tiles), tuple(cells),
             rule.pierce, EVERYWHERE if rule.bounds is None else rule.bounds,

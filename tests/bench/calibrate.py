@@ -13,6 +13,7 @@ import math
 import re
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
+from itertools import product
 from pathlib import Path
 from time import perf_counter_ns
 from typing import Any
@@ -27,8 +28,8 @@ from hitplanes.planes.common.backend import in_parts, kernels_of, use_threads
 from hitplanes.weapons.fire.strategy import expected_near
 
 FILE = Path(__file__).parents[2] / "planes" / "common" / "costs.py"
-SIZE_WH, RADIUS, RANGE = (1920, 1080), 24, 500
-SHOTS, ITEMS = (1, 100, 3000), (10, 100, 1000)
+SIZE_WH, DENSE_WH, RADIUS, RANGE = (1920, 1080), (480, 270), 24, 500
+SHOTS, ITEMS, REACHES = (1, 100, 3000), (10, 100, 1000), (3, 20, 60)
 HANDED_OVER = 20
 """Work is given to a thread if it takes so many times as long as handing it over."""
 
@@ -44,9 +45,9 @@ def scene_of(items: int, size_wh: tuple[int, int] = SIZE_WH, bounded: bool = Tru
     return scene
 
 
-def places(shots: int) -> Any:
+def places(shots: int, size_wh: tuple[int, int] = SIZE_WH) -> Any:
     """Positions of shots, spread evenly."""
-    return np.random.default_rng(shots).uniform((0, 0), SIZE_WH, (shots, 2))
+    return np.random.default_rng(shots).uniform((0, 0), size_wh, (shots, 2))
 
 
 def time_of(work: Callable[[], object]) -> float:
@@ -73,13 +74,22 @@ def fitted(names: str, rows: Sequence[Row]) -> dict[str, float]:
         used.pop(int(costs.argmin()))
 
 
-def timed(weapon: Any, strategy: str, rounds: int, shots: Sequence[int] = SHOTS) -> Iterator[tuple[int, Scene, float]]:
+def timed(
+    weapon: Any, strategy: str, rounds: int, shots: Sequence[int] = SHOTS, size_wh: tuple[int, int] = SIZE_WH
+) -> Iterator[tuple[int, Scene, float]]:
     """Times of calls over the grid of sizes, as (shots, scene, ns)."""
     for items in ITEMS:
-        scene = scene_of(items)
+        scene = scene_of(items, size_wh)
         for count in shots:
-            aim = np.random.default_rng(count).uniform(0, 360, count)
-            yield count, scene, least(partial(fire, scene, weapon, places(count), aim=aim, strategy=strategy), rounds)
+            at, aim = places(count, size_wh), np.random.default_rng(count).uniform(0, 360, count)
+            yield count, scene, least(partial(fire, scene, weapon, at, aim=aim, strategy=strategy), rounds)
+
+
+def crowded(strategy: str, rounds: int) -> Iterator[Row]:
+    """Times of calls of discs, as (1, shots, pairs of a shot and an item, those that are near, ns); some are dense."""
+    for size_wh, reach in product((SIZE_WH, DENSE_WH), REACHES):
+        for n, scene, ns in timed(Disc(reach), strategy, rounds, size_wh=size_wh):
+            yield 1, n, n * len(scene), n * expected_near(scene.items.stack(), reach), ns
 
 
 def made(weapon: Any, strategy: str, rounds: int, before: str, size_wh: tuple[int, int] = SIZE_WH) -> list[Row]:
@@ -99,14 +109,12 @@ def made(weapon: Any, strategy: str, rounds: int, before: str, size_wh: tuple[in
 
 def of_areas(rounds: int) -> dict[str, float]:
     """Costs of tiles, visible sets and label planes."""
-    disc, found = Disc(20), {}
-    tiles = [(1, n, n * len(scene), ns) for n, scene, ns in timed(disc, "tiles", rounds)]
-    found |= fitted("tiles_call tiles_placement tiles_pair", tiles)
-    visible = [(1, n, ns) for n, _, ns in timed(disc, "visible", rounds)]
-    found |= fitted("visible_call visible_placement", visible)
+    disc, found = Disc(20), fitted("tiles_call tiles_placement tiles_pair tiles_near", [*crowded("tiles", rounds)])
+    visible = [(*row[:2], *row[3:]) for row in crowded("visible", rounds)]
+    found |= fitted("visible_call visible_placement visible_near", visible)
     found |= fitted("visible_made visible_tile", [(*row[:2], row[3]) for row in made(disc, "visible", rounds, "tiles")])
     found |= fitted("labels_call", [(1, ns) for *_, ns in timed(Point(), "labels", rounds, (1,))])
-    drawn = [row[1:] for size_wh in (SIZE_WH, (480, 270)) for row in made(Point(), "labels", rounds, "tiles", size_wh)]
+    drawn = [row[1:] for size_wh in (SIZE_WH, DENSE_WH) for row in made(Point(), "labels", rounds, "tiles", size_wh)]
     return found | fitted("labels_item labels_pixel", drawn) | {"labels_box": redrawn(rounds)}
 
 

@@ -59,20 +59,28 @@ def expected_near(stack: Stack, reach: int) -> float:
     """Expected number of tiles near a placement, if they are spread evenly over the box around all."""
     if not len(stack):
         return 0.0
-    near = float(tiles_in(stack))
-    for side, world in zip(*(sizes.tolist() for sizes in stack.sizes), strict=True):
-        near *= min((min(side, WORD) + 2 * reach + 1) / world, 1.0)
-    return near
+    mean, around = stack.sizes
+    (wide, high), (width, height), reached = mean.tolist(), around.tolist(), 2 * reach + 1
+    across, down = (min(wide, WORD) + reached) / width, (min(high, WORD) + reached) / height
+    return float(tiles_in(stack) * min(across, 1.0) * min(down, 1.0))
 
 
 def _tiles_refuse(request: Request) -> str:
     return "" if request.traits.fits else "the patterns are too large for bit rows"
 
 
+def _near(request: Request) -> float:
+    """Expected number of tiles near all placements; 0 if they take less time than a call, or are near single pixels."""
+    now, stack = costs(), request.stack
+    if request.traits.is_point or request.placements * tiles_in(stack) * now.tiles_near < now.tiles_call:
+        return 0.0
+    return request.placements * expected_near(stack, request.traits.reach)
+
+
 def _tiles_cost(request: Request) -> tuple[float, float]:
     now = costs()
     each = now.tiles_placement + tiles_in(request.stack) * now.tiles_pair
-    return now.tiles_call + request.placements * each, 0.0
+    return now.tiles_call + request.placements * each + _near(request) * now.tiles_near, 0.0
 
 
 def _visible_refuse(request: Request) -> str:
@@ -85,7 +93,7 @@ def _visible_cost(request: Request) -> tuple[float, float]:
     now, scene = costs(), request.scene
     known = request.view is not None and scene.derived.visible(request.view).made(scene.items) is not None
     made = 0.0 if known else visible_ns(request.stack, now)
-    return now.visible_call + request.placements * now.visible_placement, made
+    return now.visible_call + request.placements * now.visible_placement + _near(request) * now.visible_near, made
 
 
 SIGHTED = "the weapon needs a line of sight"
