@@ -37,6 +37,9 @@ BROADPHASES = ("auto", *STRUCTURES)
 INTEGERS_REACH, INTEGERS_PLACEMENTS, INTEGERS_PAIRS = 500, 64, 2**15
 """Largest reach of patterns, px, most placements, and most pairs of placements and items counted in integers."""
 
+CROWD = 64
+"""Most tiles that are thought to lie near a placement when it is asked whether an estimate is worth its time."""
+
 
 class Way(NamedTuple):
     """A way to answer a call.
@@ -70,9 +73,10 @@ def _tiles_refuse(request: Request) -> str:
 
 
 def _near(request: Request) -> float:
-    """Expected number of tiles near all placements; 0 if they take less time than a call, or are near single pixels."""
+    """Expected number of tiles near all placements; 0 for single pixels, and where a crowd takes less than a call."""
     now, stack = costs(), request.stack
-    if request.traits.is_point or request.placements * tiles_in(stack) * now.tiles_near < now.tiles_call:
+    most = request.placements * min(tiles_in(stack), CROWD)
+    if request.traits.is_point or most * now.tiles_near < now.tiles_call:
         return 0.0
     return request.placements * expected_near(stack, request.traits.reach)
 
