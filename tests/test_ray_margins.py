@@ -33,7 +33,7 @@ from hitplanes import (
     fire,
     report_of,
 )
-from hitplanes.weapons.explain.margins import RAYS_MAX
+from hitplanes.weapons.explain.margins import FINE_RAYS, RAYS_MAX
 
 WEAPONS = (
     Laser(16), Laser(9.5, width=3), Laser(None), Laser(12, inside="ignore_until_exit"), Pistol(16),
@@ -288,6 +288,14 @@ def test_a_projectile_flies_relative_to_what_it_meets(seed: int) -> None:
 
 
 # Refusals, and what it costs
+
+
+@pytest.mark.parametrize(("rays", "distance"), [(FINE_RAYS, 0.25), (FINE_RAYS + 1, 1)])
+def test_many_rays_are_shifted_by_whole_pixels(rays: int, distance: float) -> None:
+    scene = Scene()
+    box = scene.add(Sprite.box(3, 3), (8, 2))
+    (margin,) = fire(scene, Spread(Pistol(12), rays, 0), (0, 0.25), aim=0).margins()
+    assert (margin.object, margin.hit, margin.distance, margin.shift_xy) == (box, False, distance, (0, distance))
 
 
 def test_very_many_rays_have_no_margins() -> None:

@@ -52,26 +52,26 @@ class Costs(NamedTuple):
 
 
 NUMPY = Costs(
-    tiles_call=146000, tiles_placement=57.6, tiles_pair=0.137, tiles_near=548,
-    visible_call=137000, visible_placement=107, visible_near=35.2, visible_made=81900, visible_tile=1240,
-    labels_call=68400, labels_item=5840, labels_pixel=0.0442, labels_box=16800,
-    integers_call=84400, integers_placement=232, integers_pair=1980, integers_bit=0.0756,
-    box_pair=0.585, bvh_call=63700, bvh_placement=297, bvh_moved=887, bvh_item=433,
-    cast_call=203000, cast_ray=602, cast_pair=11.7,
-    march_call=173000, march_ray=321, field_pixel=4.06,
-    prepared_march=7080, prepared_cast=35000, prepared_cast_item=32.2,
+    tiles_call=144000, tiles_placement=55.1, tiles_pair=0.121, tiles_near=533,
+    visible_call=134000, visible_placement=103, visible_near=34.8, visible_made=79800, visible_tile=1380,
+    labels_call=67400, labels_item=5960, labels_pixel=0.0461, labels_box=16500,
+    integers_call=83900, integers_placement=175, integers_pair=2000, integers_bit=0.0845,
+    box_pair=0.577, bvh_call=62900, bvh_placement=295, bvh_moved=882, bvh_item=413,
+    cast_call=198000, cast_ray=609, cast_pair=11.8,
+    march_call=171000, march_ray=327, field_pixel=4.01,
+    prepared_march=7000, prepared_cast=34900, prepared_cast_item=32,
     prepared_tile=inf, prepared_near=inf, thread=inf,
 )  # fmt: skip
 COMPILED = Costs(
-    tiles_call=54600, tiles_placement=41.1, tiles_pair=0.0151, tiles_near=45.6,
-    visible_call=56200, visible_placement=40.4, visible_near=7.95, visible_made=73900, visible_tile=1290,
-    labels_call=37700, labels_item=333, labels_pixel=0.0426, labels_box=4960,
+    tiles_call=52400, tiles_placement=39.7, tiles_pair=0.0174, tiles_near=43.2,
+    visible_call=55100, visible_placement=39.4, visible_near=7.5, visible_made=79000, visible_tile=1400,
+    labels_call=37700, labels_item=368, labels_pixel=0.0459, labels_box=4920,
     integers_call=inf, integers_placement=inf, integers_pair=inf, integers_bit=inf,
-    box_pair=0.572, bvh_call=62900, bvh_placement=314, bvh_moved=847, bvh_item=442,
-    cast_call=98600, cast_ray=142, cast_pair=0.877,
-    march_call=118000, march_ray=110, field_pixel=1.25,
-    prepared_march=7220, prepared_cast=3290, prepared_cast_item=1.9,
-    prepared_tile=1.17, prepared_near=378, thread=997000,
+    box_pair=0.587, bvh_call=64000, bvh_placement=302, bvh_moved=881, bvh_item=423,
+    cast_call=98900, cast_ray=131, cast_pair=0.859,
+    march_call=116000, march_ray=78.9, field_pixel=1.16,
+    prepared_march=2890, prepared_cast=3130, prepared_cast_item=1.83,
+    prepared_tile=1.25, prepared_near=325, thread=756000,
 )  # fmt: skip
 """Times in numpy, and with compiled kernels."""
 

@@ -29,7 +29,8 @@ from ..rays.contacts import Parts, Reason
 Shifts = npt.NDArray[Any]
 """Shifts (n, 2), px."""
 
-RAYS_MAX = 1024  # most rays of a shot that has margins; each is fired at 933 shifts
+RAYS_MAX = 1024  # most rays of a shot that has margins
+FINE_RAYS = 64  # most rays of a shot that is fired at all of RAY_SHIFTS, 933 of them; others at those of patterns, 197
 RAYS_AT_ONCE = 4096  # most rays that are fired at a time
 
 
@@ -38,7 +39,8 @@ class Margin(NamedTuple):
 
     `hit` says whether the shot as fired hits the object; `distance` is the length of `shift_xy`, px. The shift is the
     first by (y, x) of equally short ones. For patterns it is in whole pixels. Rays are also shifted by whole quarters
-    of a pixel up to 2 px, by whole 16ths up to 1/2 px, by 64ths up to 1/8 px, and by 256ths up to 1/32 px.
+    of a pixel up to 2 px, by whole 16ths up to 1/2 px, by 64ths up to 1/8 px, and by 256ths up to 1/32 px, but for
+    shots of more than 64 rays.
     """
 
     shot: int
@@ -110,7 +112,7 @@ def ray_margins(scene: Scene, parts: Parts, shot: Shots, number: int) -> list[Ma
     rays = (burst.count if burst else 1) * (several.count if several else 1)
     if rays > RAYS_MAX:
         raise InputError(f"shot: expected one of at most {RAYS_MAX} rays, got {rays}")
-    stack, shifts = scene.items.stack(), RAY_SHIFTS
+    stack, shifts = scene.items.stack(), RAY_SHIFTS if rays <= FINE_RAYS else PATTERN_SHIFTS / 1
     if not len(stack):
         return []
     if ray.inside == "error":

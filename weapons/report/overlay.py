@@ -25,7 +25,7 @@ LETTER, ROW = 7, 17  # width of a letter and height of a label, px; not the font
 LABELS_MAX = 16  # most names in one picture; the cards have all
 LINKS_MAX = 8  # most occluders that are linked to the object they kept most samples from; the cards have all
 SHOT_BADGE = 11  # radius of the disc of a shot's number, px
-NEAR, CLOSE, FAR = 40, 110, 400  # how far a name may lie from its object, a link if it can, and a link or a number, px
+NEAR, CLOSE, FAR = 40, 110, 400  # how far a name lies from its object, or from a link, if it can; and at most, px
 
 
 class Overlay:
@@ -86,7 +86,9 @@ class Overlay:
             at = np.argwhere(mask)[:, ::-1] + (x, y)
             seen = at[(at >= self.view[:2]).all(axis=1) & (at <= self.view[2:]).all(axis=1)]
             if len(seen):
-                self._label(scene.name_of(item), box, INK, NEAR, seen)
+                name = scene.name_of(item)
+                if not self._label(name, box, INK, NEAR, seen):
+                    self._label(name, box, INK, CLOSE, seen)
 
     def links(self, shots: Sequence[Mapping[str, Any]], hit: Set[int]) -> None:
         """Ring samples that an occluder kept from an object, and name both; objects that were not hit come first."""
