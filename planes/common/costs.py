@@ -52,26 +52,26 @@ class Costs(NamedTuple):
 
 
 NUMPY = Costs(
-    tiles_call=144000, tiles_placement=55.1, tiles_pair=0.121, tiles_near=533,
-    visible_call=134000, visible_placement=103, visible_near=34.8, visible_made=79800, visible_tile=1380,
-    labels_call=67400, labels_item=5960, labels_pixel=0.0461, labels_box=16500,
-    integers_call=83900, integers_placement=175, integers_pair=2000, integers_bit=0.0845,
-    box_pair=0.577, bvh_call=62900, bvh_placement=295, bvh_moved=882, bvh_item=413,
-    cast_call=198000, cast_ray=609, cast_pair=11.8,
-    march_call=171000, march_ray=327, field_pixel=4.01,
-    prepared_march=7000, prepared_cast=34900, prepared_cast_item=32,
+    tiles_call=143000, tiles_placement=56.5, tiles_pair=0.132, tiles_near=531,
+    visible_call=135000, visible_placement=102, visible_near=34.9, visible_made=81800, visible_tile=1200,
+    labels_call=66200, labels_item=5610, labels_pixel=0.0405, labels_box=17200,
+    integers_call=83700, integers_placement=220, integers_pair=1990, integers_bit=0.0859,
+    box_pair=0.585, bvh_call=63300, bvh_placement=319, bvh_moved=893, bvh_item=453,
+    cast_call=198000, cast_ray=608, cast_pair=12.2,
+    march_call=177000, march_ray=345, field_pixel=4.09,
+    prepared_march=6910, prepared_cast=34600, prepared_cast_item=30.9,
     prepared_tile=inf, prepared_near=inf, thread=inf,
 )  # fmt: skip
 COMPILED = Costs(
-    tiles_call=52400, tiles_placement=39.7, tiles_pair=0.0174, tiles_near=43.2,
-    visible_call=55100, visible_placement=39.4, visible_near=7.5, visible_made=79000, visible_tile=1400,
-    labels_call=37700, labels_item=368, labels_pixel=0.0459, labels_box=4920,
+    tiles_call=52000, tiles_placement=39.5, tiles_pair=0.0188, tiles_near=41.9,
+    visible_call=53500, visible_placement=38.3, visible_near=7.28, visible_made=76500, visible_tile=1220,
+    labels_call=36000, labels_item=324, labels_pixel=0.0408, labels_box=5000,
     integers_call=inf, integers_placement=inf, integers_pair=inf, integers_bit=inf,
-    box_pair=0.587, bvh_call=64000, bvh_placement=302, bvh_moved=881, bvh_item=423,
-    cast_call=98900, cast_ray=131, cast_pair=0.859,
-    march_call=116000, march_ray=78.9, field_pixel=1.16,
-    prepared_march=2890, prepared_cast=3130, prepared_cast_item=1.83,
-    prepared_tile=1.25, prepared_near=325, thread=756000,
+    box_pair=0.594, bvh_call=61300, bvh_placement=300, bvh_moved=847, bvh_item=413,
+    cast_call=96700, cast_ray=131, cast_pair=0.791,
+    march_call=113000, march_ray=75.6, field_pixel=1.16,
+    prepared_march=7020, prepared_cast=3100, prepared_cast_item=1.82,
+    prepared_tile=0.955, prepared_near=352, thread=953000,
 )  # fmt: skip
 """Times in numpy, and with compiled kernels."""
 
