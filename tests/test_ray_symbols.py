@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from typing import Any
 
 import numpy as np
@@ -316,9 +317,15 @@ def test_strokes_that_cross_do_not_add_up() -> None:
     head = Strokes((40, 60))
     head.head(np.array([30.0, 20.0]), np.array([1.0, 0.0]), 12.0)
     assert abs(head.ink.sum() / 255 - 12 * 12 / 2) < 3
+
+
+def test_a_stroke_of_any_width_takes_the_memory_of_the_picture() -> None:
     wide = Strokes((40, 60))
+    tracemalloc.start()
     wide.line(np.array([-(10.0**7), 20.0]), np.array([10.0**7, 20.0]), 2.0 * 10**7)
-    assert (wide.ink == 255).all()
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert (wide.ink == 255).all() and peak < 2**20
 
 
 def test_segments_are_cut_where_they_leave() -> None:

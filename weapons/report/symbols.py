@@ -169,8 +169,11 @@ def _pixels(a: Floats, b: Floats, reach: float, shape: tuple[int, int]) -> tuple
     main = int(abs(step[1]) > abs(step[0]))
     at = np.arange(low[main], high[main]) + 0.5
     part = np.clip((at - a[main]) / step[main], 0, 1) if step[main] else np.zeros(len(at))
-    wide = np.ceil(reach * np.sqrt(2.0))
-    across = np.floor(a[1 - main] + part * step[1 - main])[:, None] + np.arange(-wide, wide + 1) + 0.5
+    wide, whole = np.ceil(reach * np.sqrt(2.0)), high[1 - main] - low[1 - main]
+    if 2 * wide < whole:
+        across = np.floor(a[1 - main] + part * step[1 - main])[:, None] + np.arange(-wide, wide + 1) + 0.5
+    else:
+        across = np.broadcast_to(low[1 - main] + np.arange(whole) + 0.5, (len(at), int(max(whole, 0))))
     kept: Bools = (across > low[1 - main]) & (across < high[1 - main])
     along, across = np.broadcast_to(at[:, None], across.shape)[kept], across[kept]
     return (across, along) if main else (along, across)
