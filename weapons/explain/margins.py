@@ -21,10 +21,11 @@ from hitplanes.planes.scene.scene import Scene
 from .. import late
 from ..fire.plan import Plan
 from ..fire.spans import context_of, direct
+from ..fire.strategy import AUTO
 from ..kinds.placements import Placements, Shots, placements_for
 from ..kinds.rays import Pistol
 from ..kinds.weapon import Weapon
-from ..rays.contacts import Parts, Reason
+from ..rays.contacts import Parts, Reason, rays_each
 
 Shifts = npt.NDArray[Any]
 """Shifts (n, 2), px."""
@@ -108,8 +109,8 @@ def ray_margins(scene: Scene, parts: Parts, shot: Shots, number: int) -> list[Ma
 
     An InputError says if there are too many rays.
     """
-    burst, several, ray = parts
-    rays = (burst.count if burst else 1) * (several.count if several else 1)
+    burst, _, ray = parts
+    rays = rays_each(parts)
     if rays > RAYS_MAX:
         raise InputError(f"shot: expected one of at most {RAYS_MAX} rays, got {rays}")
     stack, shifts = scene.items.stack(), RAY_SHIFTS if rays <= FINE_RAYS else PATTERN_SHIFTS / 1
@@ -117,7 +118,7 @@ def ray_margins(scene: Scene, parts: Parts, shot: Shots, number: int) -> list[Ma
         return []
     if ray.inside == "error":
         start = Pistol(0, width=2 * ray.radius_256 / SUB)
-        how = scene, start, (burst, None, start), _moved(shot, shifts), ("auto", "auto", "auto"), Plan()
+        how = scene, start, (burst, None, start), _moved(shot, shifts), AUTO, Plan()
         stop = late.ray_call.fired_rays(*how).stop
         shifts = np.delete(shifts, stop.shot[stop.reason != Reason.RANGE], axis=0)
     step = max(1, RAYS_AT_ONCE // rays)

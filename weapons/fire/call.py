@@ -24,7 +24,7 @@ from .areas import Request, leave_out_unused, traits_of
 from .hits import Hits, Rows
 from .plan import Plan, read_stack, unaimed
 from .prefilter import may_refuse, prefilter_of, view_of
-from .strategy import BROADPHASES, STRATEGIES, chosen_candidates, chosen_way
+from .strategy import AUTO, BROADPHASES, STRATEGIES, chosen_candidates, chosen_way
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -63,8 +63,6 @@ if TYPE_CHECKING:
 
 How = tuple[str, str, str]
 """Pre-filter, broad phase and strategy of a call."""
-
-AUTO: How = ("auto", "auto", "auto")
 
 ONE_AIM = int | float | np.number | None
 """Types of the aim of one shot; several aims have one position, and their filters are those of several shots."""

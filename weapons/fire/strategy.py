@@ -33,6 +33,9 @@ if TYPE_CHECKING:
 
 BROADPHASES = ("auto", *STRUCTURES)
 
+AUTO = "auto", "auto", "auto"
+"""Pre-filter, broad phase and strategy of a call that names none."""
+
 
 INTEGERS_REACH, INTEGERS_PLACEMENTS, INTEGERS_PAIRS = 500, 64, 2**15
 """Largest reach of patterns, px, most placements, and most pairs of placements and items counted in integers."""

@@ -62,6 +62,12 @@ class Rays(Columns):
 Parts = tuple[Rounds[Any] | None, Spread[Any] | Sweep | None, RayWeapon]
 
 
+def rays_each(parts: Parts) -> int:
+    """Number of rays of a shot."""
+    burst, several, _ = parts
+    return (burst.count if burst else 1) * (several.count if several else 1)
+
+
 def rays_of(parts: Parts, shots: Shots) -> Rays:
     """Make the ray of every pellet of every round of every shot; `parts` are the weapon's."""
     burst, several, _ = parts

@@ -24,11 +24,11 @@ from .. import late
 from ..fire.hits import Rows
 from ..fire.plan import Plan, leave_out_absent, leave_out_imagery, read_stack
 from ..fire.prefilter import Candidates, may_refuse, view_of
-from ..fire.strategy import RAY_WAYS, RayChoice, are_faster_alone, chosen_candidates, chosen_ray_way
+from ..fire.strategy import AUTO, RAY_WAYS, RayChoice, are_faster_alone, chosen_candidates, chosen_ray_way
 from ..kinds.placements import Shots
 from ..kinds.rays import RayWeapon, ends_at_first, is_thin_first
 from ..kinds.weapon import Weapon
-from .contacts import Parts, Rays, Reason, Terminations, Touches, rays_of
+from .contacts import Parts, Rays, Reason, Terminations, Touches, rays_each, rays_of
 from .first_hit import FirstHits, ends_by_march
 from .ray_hits import Later, Passes, RayHits, Stops, Summed, Walk, pixels_of, rows_of_passes, walked_of
 from .ray_walk import Range, expected_cells, has_whole_walk, trace
@@ -60,8 +60,7 @@ def fired_rays(
 ) -> RayHits:
     """Decide what shots of a ray weapon hit; `how` is (prefilter, broadphase, strategy) of `fire`."""
     ray = parts[2]
-    burst, several, _ = parts
-    each = (burst.count if burst else 1) * (several.count if several else 1)
+    each = rays_each(parts)
     through, chosen, choose = _planned(scene, ray, view_of(False, shots), each * len(shots), how, plan)
     step = max(1, RAYS_AT_ONCE // each)
     rows: list[Rows] = []
@@ -100,7 +99,7 @@ def _planned(
     """
     stack = read_stack(scene, plan)
     prefilter, broadphase, strategy = how
-    chosen = chosen_ray_way(strategy, how[:2] != ("auto", "auto"), ray, scene, stack, view, count)
+    chosen = chosen_ray_way(strategy, how[:2] != AUTO[:2], ray, scene, stack, view, count)
     choose = partial(chosen_candidates, prefilter, broadphase, scene, stack)
     walks = chosen.way == "walk"
     candidates = choose(count if walks else 0)
@@ -117,7 +116,7 @@ def end_times(scene: Scene, ray: RayWeapon, view: View | None, count: int) -> Ca
     stack, follow = scene.items.stack(), None
     if view is not None and are_faster_alone(count, stack):
         follow, _ = late.one_ray.chosen_follower(scene, stack, ray, view, False)
-    planned = cache(lambda: _planned(scene, ray, view, count, ("auto", "auto", "auto"), Plan()))
+    planned = cache(lambda: _planned(scene, ray, view, count, AUTO, Plan()))
 
     def ended(shots: Shots) -> tuple[Rays, Ints]:
         """Rays of shots, and when they end."""
@@ -138,8 +137,7 @@ def end_times(scene: Scene, ray: RayWeapon, view: View | None, count: int) -> Ca
 def items_hit(scene: Scene, parts: Parts, shots: Shots) -> tuple[Ints, Ints]:
     """Items that shots hit, as (shot, rank), some several times. Rows, passes and stops are not made."""
     ray, rays = parts[2], rays_of(parts, shots)
-    how = ("auto", "auto", "auto")
-    through, chosen, choose = _planned(scene, ray, view_of(False, shots), len(rays), how, Plan())
+    through, chosen, choose = _planned(scene, ray, view_of(False, shots), len(rays), AUTO, Plan())
     if ends_at_first(ray):
         ends = _first_ends(rays, ray, shots, through, chosen.way, choose)
         hit = np.flatnonzero(ends.reason == Reason.HITS)

@@ -26,7 +26,7 @@ from ..fire.call import fired as fire_checked
 from ..fire.hits import BEFORE, HitRow, Hits
 from ..fire.spans import context_of
 from ..kinds.areas import is_directed, parts_of, ray_parts_of
-from ..kinds.placements import placements_for
+from ..kinds.placements import placements_for, placements_of
 from ..kinds.weapon import Weapon
 from ..rays.contacts import Reason, rays_of
 from ..rays.ray_hits import Passes, RayHits, Stops
@@ -297,8 +297,7 @@ def _boxes(hits: Hits) -> Ints:
         ends = np.concatenate([pixel(hits.shots.at_256), hits.stop.cell_xy])  # rays, from starts to stops
         return np.concatenate([ends.min(axis=0), ends.max(axis=0)])[None] if len(hits.stop) else NO_BOXES
     found = []
-    burst, spread, _ = parts_of(hits.weapon)
-    step = max(1, PLACEMENTS_AT_A_TIME // ((burst.count if burst else 1) * (spread.count if spread else 1)))
+    step = max(1, PLACEMENTS_AT_A_TIME // placements_of(hits.weapon))
     for first in range(0, len(hits.shots), step):
         boxes = placements_for(hits.weapon, hits.shots.take(first, first + step)).boxes
         boxes = boxes[boxes[:, 0] <= boxes[:, 2]]
