@@ -124,8 +124,9 @@ SCENES: dict[str, tuple[Any, str]] = {
     "objects, list": (changed("objects", []), r"objects: expected an object, got \[\]"),
     "section": (changed("objects.ocluders", []), "key: .*got 'ocluders' .did you mean 'occluders'"),
     "section, null": (changed("objects.hud", None), "objects: hud: expected a list, got None"),
+    "bounds, text": (changed("bounds", "all"), r"scene\.json: bounds: expected an object, got 'all'"),
     # an object
-    "object, text": (changed(DUCK, "duck"), r"objects\.hittable\[0\]: object: expected an object, got 'duck'"),
+    "object, text": (changed(DUCK, "duck"), r"objects\.hittable\[0\]: expected an object, got 'duck'"),
     "no source": (changed(f"{DUCK}.circle", MISSING), r"objects\.hittable\[0\]: source: expected one of image"),
     "source, misspelled": (
         object_of(circel=4), r"hittable\[0\]: source: .*got circel .did you mean 'circle'\?"),

@@ -578,7 +578,7 @@ BAD_FILES: dict[str, tuple[Any, str]] = {
     "objects": ({"format": FORMAT, "objects": []}, r"objects: expected an object, got \[\]"),
     "section": ({"format": FORMAT, "objects": {"hitable": []}}, "got 'hitable' .did you mean 'hittable'"),
     "section list": ({"format": FORMAT, "objects": {"hud": {}}}, r"objects: hud: expected a list, got \{\}"),
-    "object": ({"format": FORMAT, "objects": {"movers": [5]}}, r"objects\.movers\[0\]: object: expected an object"),
+    "object": ({"format": FORMAT, "objects": {"movers": [5]}}, r"objects\.movers\[0\]: expected an object"),
     "some ids": (
         {"format": FORMAT, "objects": {"movers": [{"circle": 1, "position_xy": [0, 0], "id": 1}],
                                        "hud": [{"circle": 1, "position_xy": [0, 0]}]}},

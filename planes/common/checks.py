@@ -43,11 +43,12 @@ class InputError(ValueError):
 
 @contextmanager
 def within(place: str) -> Iterator[None]:
-    """Put the place of a field in front of the errors raised inside: file, list, row."""
+    """Put the place of a field in front of the errors raised inside, unless they name it: file, list, row."""
     try:
         yield
     except InputError as error:
-        raise InputError(f"{place}: {error}") from error
+        text = str(error)
+        raise InputError(text if text.startswith(f"{place}: ") else f"{place}: {text}") from error
 
 
 def array_of(

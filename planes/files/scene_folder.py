@@ -49,7 +49,6 @@ from ..common.tables import (
     Word,
     inside,
     json_of,
-    typed,
 )
 from ..scene.objects import OCCLUDER, PLANE_NAMES, ROLES
 from ..scene.scene import Scene, default_bits
@@ -228,7 +227,9 @@ def _entries(objects: dict[str, Sequence[object]], folder: Path) -> list[Entry]:
 
 def _object(entry: object, folder: Path, sprites: dict[str, Sprite]) -> dict[str, Any]:
     """Check an object, and replace what makes its sprite by that; `sprites` has those of earlier objects."""
-    given = typed("object", entry, dict)
+    if not isinstance(entry, dict):
+        raise InputError(f"expected an object, got {shown(entry)}")
+    given = entry
     kinds = [key for key in SOURCES if key in given]
     if len(kinds) != 1:
         unknown = [key for key in given if not kinds and not any(key in keys.forms for keys in OBJECT.values())]

@@ -166,7 +166,7 @@ def fire_anew(
     bits = category_bits(present, "accept", accept), category_bits(present, "blocked_by", blocked_by)
     shots = checked_shots(weapon, at, aim, toward, *bits, exclude, seed, shot)
     if exclude is not None:
-        check_owners(present, shots.owners)
+        check_owners(present, shots.owners, exclude)
     plan.run("shots", f"{len(shots)} checked", shots.nbytes)
     if aim is None and toward is None:
         plan.leave_out_all(unaimed, weapon)
@@ -345,18 +345,23 @@ def category_bits(scene: Scene, field: str, value: object) -> object:
     return value
 
 
-def check_owners(scene: Scene, exclude: Ints | tuple[int, ...]) -> None:
-    """Check that each excluded owner (N, K), or (K,), is the id of an object that a scene has or had, or -1."""
+def check_owners(scene: Scene, owners: Ints | tuple[int, ...], exclude: object) -> None:
+    """Check that each excluded owner (N, K), or (K,), is the id of an object that a scene has or had, or -1.
+
+    `exclude` is the argument that they are read from.
+    """
     items = scene.latest.items
-    greatest = max(exclude, default=-1) if isinstance(exclude, tuple) else int(exclude.max(initial=-1))
+    greatest = max(owners, default=-1) if isinstance(owners, tuple) else int(owners.max(initial=-1))
     if greatest < items.count:
         return
-    every = np.atleast_2d(exclude)
+    every = np.atleast_2d(owners)
     row, column = np.argwhere(every >= items.count)[0].tolist()
     last = range(max(items.count - LOOKED_AT, 0), items.count)
     parts = set(items.ids[items.owner[items.rows] != items.ids].tolist())
-    owners = [owner for owner in last if owner not in parts and items.name_of(owner)]
-    near = ", ".join(f"{owner} {items.name_of(owner)!r}" for owner in owners[-OWNERS_NAMED:])
+    whole = [owner for owner in last if owner not in parts and items.name_of(owner)]
+    near = ", ".join(f"{owner} {items.name_of(owner)!r}" for owner in whole[-OWNERS_NAMED:])
     known = f"the nearest are {near}" if near else "it never had any"
+    alone = every.size == 1 or np.ndim(exclude) == 0  # type: ignore[arg-type]
+    place = "" if alone else f"[{row + column}]" if np.ndim(exclude) == 1 else f"[{row}][{column}]"  # type: ignore[arg-type]
     got = every[row, column]
-    raise InputError(f"exclude[{row}][{column}]: expected an owner that the scene has or had, got {got}; {known}")
+    raise InputError(f"exclude{place}: expected an owner that the scene has or had, got {got}; {known}")

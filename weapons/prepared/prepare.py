@@ -341,7 +341,7 @@ def _filter_of(scene: Scene, accept: object, blocked_by: object, exclude: object
     """Check the filter of one shot."""
     bits = category_bits(scene, "accept", accept), category_bits(scene, "blocked_by", blocked_by)
     meets, owners = checked_filter(*bits, 1), checked_owners(exclude, 1, single=True)
-    check_owners(scene, owners)
+    check_owners(scene, owners, exclude)
     of_shot = owners if isinstance(owners, tuple) else tuple(owners[0].tolist())
     return Filter(_only(meets), of_shot, _only(checked_seeds(seed, 1)))
 

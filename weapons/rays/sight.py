@@ -161,7 +161,7 @@ def _shots(field: str, at: object, scene: object, accept: object, blocked_by: ob
     bits = category_bits(present, "accept", accept), category_bits(present, "blocked_by", blocked_by)
     shots = unaimed_shots(field, at, *bits, exclude)
     if exclude is not None:
-        check_owners(present, shots.owners)
+        check_owners(present, shots.owners, exclude)
     return shots
 
 
