@@ -298,8 +298,8 @@ def test_boxes_that_meet(name: str, seed: int, far: int, brute: int, few: int, a
 # Tiles, and what of them is seen
 
 
-def tiled(masks: list[np.ndarray], atlas: TileAtlas, forms: int) -> Tiles:
-    return atlas.tiles(masks.__getitem__, np.arange(len(masks)), forms)
+def tiled(masks: list[np.ndarray], atlas: TileAtlas, arrangement: int) -> Tiles:
+    return atlas.tiles(masks.__getitem__, np.arange(len(masks)), arrangement)
 
 
 def pixels_in(words: np.ndarray, begin: int, left: int, top: int, height: int) -> set[Pixel]:
@@ -391,16 +391,16 @@ def test_an_atlas_grows_and_drops_masks(monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.setattr("hitplanes.planes.bits.tiles.PACKED_AT_ONCE", 3)
     rng, atlas, made, number = random.Random(1), TileAtlas(), [], [0, 0, 0]
     old, kept = atlas.tiles([].__getitem__, np.zeros(0, np.int64), -1), atlas.words
-    for forms in range(120):
+    for arrangement in range(120):
         made += [mask_of(rng, rng.randint(1, 140), rng.randint(1, 70)) for _ in "abc"]
         fresh = range(len(made) - 3, len(made))
         number = [rng.choice(fresh) if rng.random() < 0.4 else one for one in number]
-        if forms in (10, 20, 30):
+        if arrangement in (10, 20, 30):
             number = rng.choices(fresh, k=rng.randint(0, 4))
         rng.shuffle(number)
-        tiles = atlas.tiles([made[one] for one in number].__getitem__, np.array(number, np.int64), forms)
+        tiles = atlas.tiles([made[one] for one in number].__getitem__, np.array(number, np.int64), arrangement)
         words = tiles.words.copy()
-        assert atlas.tiles([].__getitem__, np.array(number), forms) is tiles
+        assert atlas.tiles([].__getitem__, np.array(number), arrangement) is tiles
         for rank, one in enumerate(number):
             own = [k for k in range(len(tiles)) if tiles.rank[k] == rank]
             inside = [tiles.inside_xyxy[k].tolist() for k in own]

@@ -95,7 +95,7 @@ def test_the_stack_after_any_change_is_the_one_made_anew(
         old.append((stack, told(stack)))
     for stack, before in old:
         assert told(stack) == before, "a stack that was handed out changed"
-    alike = {told_forms(stack) for stack, _ in old}
+    alike = {told_arrangement(stack) for stack, _ in old}
     assert len(alike) == len({number for number, _ in alike})
 
 
@@ -113,11 +113,11 @@ def masks_of(tiles: Tiles, stack: Stack) -> list[Any]:
     return [mask.tolist() for mask in masks]
 
 
-def told_forms(stack: Stack) -> tuple[int, str]:
-    """The number of its forms, and what it says beside the places."""
+def told_arrangement(stack: Stack) -> tuple[int, str]:
+    """The number of its arrangement, and what it says beside the places."""
     all_but_boxes = told(stack)
     del all_but_boxes[COLUMNS.index("box_xyxy")]
-    return stack.forms, repr([*all_but_boxes, [b - a for a, b in zip(*sides(stack), strict=True)]])
+    return stack.arrangement, repr([*all_but_boxes, [b - a for a, b in zip(*sides(stack), strict=True)]])
 
 
 def sides(stack: Stack) -> tuple[list[int], list[int]]:
@@ -139,19 +139,19 @@ def test_moves_keep_the_number_of_the_forms_and_share_all_but_the_boxes() -> Non
     ):
         act()
         stack = scene.items.stack()
-        assert stack is not first and stack.forms == first.forms
+        assert stack is not first and stack.arrangement == first.arrangement
         for name in ("ids", "occluder", "categories", "owner", "offset", "masks", "rows", "rank_by_label"):
             assert getattr(stack, name) is getattr(first, name), name
-    seen = {first.forms}
+    seen = {first.arrangement}
     for values in ({"layer": 1}, {"angle": 40}, {"categories": 5}, {"owner": 0}, {"role": "mover"}, {"scale": 2}):
         scene.set(int(ids[-1]), **values)  # type: ignore[arg-type]
-        seen.add(scene.items.stack().forms)
+        seen.add(scene.items.stack().arrangement)
     scene.remove(int(ids[-1]))
-    seen.add(scene.items.stack().forms)
+    seen.add(scene.items.stack().arrangement)
     add_one(scene, np.random.default_rng(2))
-    seen.add(scene.items.stack().forms)
+    seen.add(scene.items.stack().arrangement)
     assert len(seen) == 9
-    assert Scene().items.stack().forms not in seen
+    assert Scene().items.stack().arrangement not in seen
 
 
 def test_the_sizes_of_a_stack_are_its_own() -> None:
@@ -277,10 +277,12 @@ def test_ids_that_are_left_out_are_in_no_stack() -> None:
     assert Scene().items.stack().ranks(np.arange(2)).tolist() == [-1, -1]
 
 
-def test_a_stack_of_other_roles_has_forms_of_its_own() -> None:
+def test_a_stack_of_other_roles_has_an_arrangement_of_its_own() -> None:
     scene = random_scene(np.random.default_rng(3), 9)
-    forms = [scene.items.stack_of(*roles).forms for roles in ((Role.MOVER,), (Role.HUD,), (Role.HITTABLE,))]
-    assert len({*forms, scene.items.stack().forms}) == 4
+    arrangements = [
+        scene.items.stack_of(*roles).arrangement for roles in ((Role.MOVER,), (Role.HUD,), (Role.HITTABLE,))
+    ]
+    assert len({*arrangements, scene.items.stack().arrangement}) == 4
 
 
 def test_the_journal_forgets_no_more_than_it_must(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -309,5 +311,5 @@ def test_the_stacks_of_the_past_are_those_of_their_time() -> None:
         history.record(tick)
         then.append(said_of(scene))
     assert [told(history.at(tick).items.stack()) for tick in history.ticks] == then
-    forms = {history.at(tick).items.stack().forms for tick in history.ticks}
-    assert len(forms) < 15, "what only moved keeps its forms"
+    arrangements = {history.at(tick).items.stack().arrangement for tick in history.ticks}
+    assert len(arrangements) < 15, "what only moved keeps its arrangement"

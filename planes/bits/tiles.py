@@ -360,23 +360,23 @@ class TileAtlas:
         self._bigs: dict[int, BigTiles] = {}
         self._lock = threading.Lock()
 
-    def known(self, forms: int) -> Tiles | None:
-        """Tiles of the last stack, if its forms had this number."""
+    def known(self, arrangement: int) -> Tiles | None:
+        """Tiles of the last stack, if its arrangement had this number."""
         last = self._last
-        return last[1] if last is not None and last[0] == forms else None
+        return last[1] if last is not None and last[0] == arrangement else None
 
-    def tiles(self, mask_of: Callable[[int], Bools], number: Ints, forms: int) -> Tiles:
+    def tiles(self, mask_of: Callable[[int], Bools], number: Ints, arrangement: int) -> Tiles:
         """Tiles of the items of a stack.
 
         Parameters
         ----------
         mask_of : returns the mask (h, w) of the item of a rank
         number : (M,) number of each item's mask; equal masks may have the same
-        forms : number of the stack's forms; stacks with the same have the same tiles
+        arrangement : number of the stack's arrangement; stacks with the same have the same tiles
         """
         with self._lock:
-            if self._last is None or self._last[0] != forms:
-                self._last = forms, self._listed(*self._found(mask_of, number))
+            if self._last is None or self._last[0] != arrangement:
+                self._last = arrangement, self._listed(*self._found(mask_of, number))
             return self._last[1]
 
     def _listed(self, first: Ints, count: Ints) -> Tiles:

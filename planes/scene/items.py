@@ -47,11 +47,11 @@ class Stack:
     offset: Ints  # (M,) start of the item's mask in `masks`, row by row
     masks: Bools  # flat booleans of all masks in use
     layered: bool  # whether the items lie on more than one layer
-    forms: int  # number of the arrangement: stacks of the same number differ only in boxes
+    arrangement: int  # number of the arrangement: stacks of the same number differ only in boxes
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """A copy is an arrangement of its own: numbers of another process mean nothing here."""
-        vars(self).update(state, forms=next(ARRANGEMENTS))
+        vars(self).update(state, arrangement=next(ARRANGEMENTS))
 
     def placed(self, box_xyxy: Ints) -> Stack:
         """A stack of the same items in the same order at other places; they share the rest, but for cached `sizes`."""
@@ -501,13 +501,13 @@ class Items:
 
     def _stack_after(self, last: Stack | None) -> Stack:
         """The stack of the present version; it shares unchanged columns with the last one."""
-        if last is not None and last.forms == self.arrangement:
+        if last is not None and last.arrangement == self.arrangement:
             return last.placed(self._boxes_in_order(last.rows))
         if last is None or not self._in_order:
             return self.stack_of(*DECIDING)
         rows = last.rows
         return last.reformed(
-            forms=self.arrangement, box_xyxy=self._boxes_in_order(rows), offset=self.offset.take(rows),
+            arrangement=self.arrangement, box_xyxy=self._boxes_in_order(rows), offset=self.offset.take(rows),
             masks=self.atlas.flat, categories=self._filtered_by(rows, last.occluder), owner=self.owner.take(rows),
         )  # fmt: skip
 
@@ -551,11 +551,11 @@ class Items:
         """Bit rows of the masks of the stack."""
         stack = self.stack()
         atlas = self.by_mask.tiles = self.by_mask.tiles or late.tiles.TileAtlas()
-        known = atlas.known(stack.forms)
+        known = atlas.known(stack.arrangement)
         if known is not None:
             return known
         variants, rows = self.variants, stack.rows
-        return atlas.tiles(lambda rank: variants[rows[rank]].mask, self.mask.take(rows), stack.forms)
+        return atlas.tiles(lambda rank: variants[rows[rank]].mask, self.mask.take(rows), stack.arrangement)
 
     def covers(self, rows: Ints, boxes_xyxy: Ints, near_xyxy: Box | None) -> tuple[Ints, Ints]:
         """Rectangles that cover the masks of items (B,); see `bits.shadows.Covers.of`."""

@@ -67,7 +67,7 @@ def blockers_of(
     if not len(rank):
         return None
     boxes_xyxy = stack.box_xyxy[rank]
-    if stack.forms == scene.items.arrangement:
+    if stack.arrangement == scene.items.arrangement:
         rects = scene.items.covers(stack.rows[rank], boxes_xyxy, near_xyxy)
     else:  # the masks of then may be gone from the scene
         rects = late.shadows.Covers().of(np.arange(len(rank)), lambda row: stack.mask(rank[row]), boxes_xyxy, near_xyxy)

@@ -37,7 +37,7 @@ def verdicts_of(request: Request, rows: Rows, way: str) -> Ints:
     The tiles of a stack that the scene has left behind are gone, unless items only moved; then the reference counts.
     """
     stack, items = request.stack, request.scene.items
-    gone = items.stack().forms != stack.forms
+    gone = items.stack().arrangement != stack.arrangement
     first = replace(request, candidates=Candidates(items, stack), filtered=False, plan=Plan())  # not that of the call
     if way == "spans" or gone or request.blockers is not None or not request.traits.fits:
         return _by_spans(first)

@@ -180,8 +180,8 @@ class ReadyRay(Ready[RayHits]):
 
     def _read(self, version: int, stack: Stack) -> None:
         self._stack = stack
-        if stack.forms != self._arrangement:
-            self._arrangement = stack.forms
+        if stack.arrangement != self._arrangement:
+            self._arrangement = stack.arrangement
             self._ids = stack.ids.data
         self._follows = self._unsettled
         cost = None if self._budget_256 is None else self.scene.items.cost[stack.rows]
