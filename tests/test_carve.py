@@ -257,7 +257,7 @@ def test_cells_are_as_fine_as_a_pose_needs_and_no_finer() -> None:
         ({"scale": 2}, 4), ({"scale": 256}, 512), ({"scale": 255, "angle": 1}, 512), ({"scale": (1, 0.5)}, 2),
     ):  # fmt: skip
         item = scene.add(np.ones((2, 2), np.bool_), **pose)
-        assert cells_per_px(scene.items.forms[item]) == expected
+        assert cells_per_px(scene.items.transforms[item]) == expected
 
 
 @pytest.mark.parametrize("pose", [{"scale": 40}, {"scale": (31, 0.7), "angle": 1}, {"scale": (0.004, 9), "angle": 88}])
@@ -277,7 +277,7 @@ def test_a_picture_shows_the_holes() -> None:
         scene = Scene()
         item = scene.add(np.full((20, 30, 4), 255, np.uint8), (0, 0), **pose)
         scene.carve(fire(scene, Disc(5), (4, 2)))
-        image, pivot_x, pivot_y = picture_of(scene.sprite(item), scene.items.forms[item], (1, 2, 3))
+        image, pivot_x, pivot_y = picture_of(scene.sprite(item), scene.items.transforms[item], (1, 2, 3))
         left, top = (-pivot_x + 128) // 256, (-pivot_y + 128) // 256
         drawn = {(left + int(i), top + int(j)) for j, i in np.argwhere(image[:, :, 3] > 0)}
         assert drawn == pixels_of(scene, item)

@@ -162,5 +162,5 @@ def test_rays_are_drawn_in_both_pictures_and_told() -> None:
     rows = [side.sum(axis=1).max() for side in white]
     assert min(rows[:2]) > 60 and rows[2] < 20, "an arrow in each, none in the difference"
     lines = differences(*reports)
-    where = 'goes through object 0 "crate" from 17.5 px to 26.5 px, was from 11.5 px to 20.5 px'
+    where = 'in object 0 "crate" from 17.5 px to 26.5 px, was from 11.5 px to 20.5 px'
     assert f"shot 0 (laser at 4, 20): ray: {where}" in lines

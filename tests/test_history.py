@@ -50,7 +50,7 @@ from hitplanes.planes.volumes.volumes import Circles
 
 ROOT = Path(__file__).parents[1]
 WEAPONS = (Point(), Disc(9), Disc(30, pierce=True, falloff="linear"), Beam(60, 3), Rounds(Spread(Disc(2), 5, 9), 2))
-LISTS = ("sprites", "names", "angles", "variants", "forms")
+LISTS = ("sprites", "names", "angles", "variants", "transforms")
 
 
 def yard(n: int = 40) -> Scene:
@@ -439,7 +439,7 @@ def test_what_did_not_change_is_kept_once() -> None:
     history.record()
     fourth = history.at(3).items
     assert {name for name in COLUMNS if getattr(fourth, name) is getattr(third, name)} >= {"position_256", "layer"}
-    assert fourth.names is third.names and fourth.sprites is third.sprites and fourth.forms is not third.forms
+    assert fourth.names is third.names and fourth.sprites is third.sprites and fourth.transforms is not third.transforms
     scene.weapons["gun"]["radius"] = 5
     history.record()
     assert history.at(4).items is fourth
@@ -782,10 +782,8 @@ def test_only_what_turns_gets_a_new_mask(monkeypatch: pytest.MonkeyPatch) -> Non
     history.record()
     before, made = history.at(0).items, []
     flat = before.atlas.flat
-    variants_of = history_module.variants_of
-    monkeypatch.setattr(
-        history_module, "variants_of", lambda sprites, forms: made.extend(forms) or variants_of(sprites, forms)
-    )
+    inner = history_module.variants_of
+    monkeypatch.setattr(history_module, "variants_of", lambda sprites, new: made.extend(new) or inner(sprites, new))
     monkeypatch.setattr(items_module, "variants_of", lambda *_: pytest.fail("a mask was made"))
     past = history.at(0.5).items
     assert len(made) == 1

@@ -33,9 +33,9 @@ def made(monkeypatch: pytest.MonkeyPatch) -> list[list[int]]:
     calls: list[list[int]] = []
     inner = items_module.variants_of
 
-    def variants_of(sprites: Any, forms: Any) -> Any:
-        calls.append([form.quarter for form in forms])
-        return inner(sprites, forms)
+    def variants_of(sprites: Any, transforms: Any) -> Any:
+        calls.append([transform.quarter for transform in transforms])
+        return inner(sprites, transforms)
 
     monkeypatch.setattr(items_module, "variants_of", variants_of)
     return calls
@@ -162,11 +162,11 @@ sides = st.integers(1, MASK_SIDE_MAX)
 def test_what_surely_fits_does(width: int, height: int, sx: float, sy: float, angle: float, pivot: int) -> None:
     """Its grid is measured, without its mask."""
     sprite = Sprite.from_mask(np.ones((1, 1), np.bool_))
-    form = transform_of(sprite, 0, "none", (sx, sy), angle)
+    transform = transform_of(sprite, 0, "none", (sx, sy), angle)
     vars(sprite)["sides"] = width + height
-    if not surely_fits(sprite, form):
+    if not surely_fits(sprite, transform):
         return
-    grids = variants_module._grids_of([(width, height, pivot, -pivot)], np.zeros(1, np.int64), [form])
+    grids = variants_module._grids_of([(width, height, pivot, -pivot)], np.zeros(1, np.int64), [transform])
     wide, high = grids.size_wh[0].tolist()
     assert max(wide, high) <= MASK_SIDE_MAX and wide * high <= MASK_AREA_MAX
 

@@ -60,8 +60,8 @@ def state(scene: Scene) -> list[Any]:
     columns = [
         getattr(items, c)[: items.table.height].tolist() for c in ("size_wh", "role", "layer", "categories", "owner")
     ]
-    lists = [len(v) for v in (items.sprites, items.forms, items.angles, items.variants, items.names)]
-    return [items.count, len(scene), items.version, masks, columns, list(items.angles), list(items.forms), lists]
+    lists = [len(v) for v in (items.sprites, items.transforms, items.angles, items.variants, items.names)]
+    return [items.count, len(scene), items.version, masks, columns, list(items.angles), list(items.transforms), lists]
 
 
 # Adding and removing
@@ -316,10 +316,10 @@ def test_a_change_of_one_thing_keeps_the_others() -> None:
     for name, value in {**pose, "position_xy": (3, 4)}.items():
         scene.set(item, **{name: [value] if name == "scale" else value})
     assert pixels(scene, item) == pixels(scene, expected)
-    assert scene.items.forms[item] == scene.items.forms[expected]
+    assert scene.items.transforms[item] == scene.items.transforms[expected]
     scene.set(item, angle=0)
     scene.set(item, angle=33.25)
-    assert scene.items.forms[item] == scene.items.forms[expected]
+    assert scene.items.transforms[item] == scene.items.transforms[expected]
 
 
 @pytest.mark.parametrize(

@@ -97,7 +97,7 @@ def with_object(**values: Any) -> dict[str, Any]:
 def poses(scene: Scene) -> list[Any]:
     items = scene.items
     return [
-        (items.names[i], items.forms[i], items.angles[i], *(getattr(items, c)[i].tolist() for c in COLUMNS))
+        (items.names[i], items.transforms[i], items.angles[i], *(getattr(items, c)[i].tolist() for c in COLUMNS))
         for i in items.rows.tolist()
     ]
 

@@ -201,22 +201,32 @@ def test_a_pixel_is_set_if_a_set_square_holds_its_centre(
 def test_masks_that_are_made_together_are_those_made_alone(jit: bool, poses: list[tuple]) -> None:
     """Frames of several sizes and scales, some of them twice; large ones are made in strips."""
     sprites = [sprite_of(mask, pivot) for mask, pivot, *_ in poses]
-    forms = [posed(sprite, *pose) for sprite, (_, _, *pose) in zip(sprites, poses, strict=True)]
-    alone = [[variant_of(Sprite(sprite.frames, sprite.pivot_256), form) for form in forms] for sprite in sprites]
-    pairs = list(itertools.product(sprites, forms))
+    transforms = [posed(sprite, *pose) for sprite, (_, _, *pose) in zip(sprites, poses, strict=True)]
+    alone = [
+        [variant_of(Sprite(sprite.frames, sprite.pivot_256), transform) for transform in transforms]
+        for sprite in sprites
+    ]
+    pairs = list(itertools.product(sprites, transforms))
     with mock.patch.object(kernels_of(variants), "MAPPED_PIXELS", 60):
         together = variants_of(*zip(*pairs, strict=True))
         again = variants_of(*zip(*pairs, strict=True))
     assert all(one is other for one, other in zip(together, again, strict=True))
     for one, other in zip(together, itertools.chain.from_iterable(alone), strict=True):
         assert np.array_equal(one.mask, other.mask)
-        assert (one.form, one.pivot_x, one.pivot_y, one.area) == (other.form, other.pivot_x, other.pivot_y, other.area)
+        assert (one.transform, one.pivot_x, one.pivot_y, one.area) == (
+            other.transform,
+            other.pivot_x,
+            other.pivot_y,
+            other.area,
+        )
         assert not one.mask.flags.writeable
 
 
 @pytest.mark.parametrize(("scale", "flip"), in_turn(SCALES, FLIPS))
 @pytest.mark.parametrize("angle", [0, 90, 180, 270, 45, -45, 135, 30])
-def test_every_form_of_an_uneven_mask_is_the_reference(scale: tuple[float, float], angle: float, flip: str) -> None:
+def test_every_transform_of_an_uneven_mask_is_the_reference(
+    scale: tuple[float, float], angle: float, flip: str
+) -> None:
     mask = np.array([[1, 1, 0, 1], [1, 0, 0, 0], [1, 1, 1, 0]], np.bool_)
     expected = oracle.placed_mask(mask.tolist(), None, turn_of(flip, scale, angle), (77, -300))
     assert placed(sprite_of(mask), (77, -300), flip=flip, scale=scale, angle=angle) == expected
@@ -237,9 +247,9 @@ def test_a_sprite_with_a_step_turns_by_whole_steps_of_a_turn(steps: int) -> None
     stepped, free = Sprite.from_mask(mask, angle_step=360 / steps), Sprite.from_mask(mask)
     for turn, number, rest in itertools.product((-360 * 10**9, 0, 360), (0, 1, 2, steps - 1), (-0.49, 0, 0.49)):
         asked, nearest = turn + (number + rest) * 360 / steps, number % steps * 360 / steps
-        form = posed(stepped, angle=asked)
-        assert form == posed(free, angle=nearest), asked
-        assert np.array_equal(variant_of(stepped, form).mask, variant_of(free, form).mask)
+        transform = posed(stepped, angle=asked)
+        assert transform == posed(free, angle=nearest), asked
+        assert np.array_equal(variant_of(stepped, transform).mask, variant_of(free, transform).mask)
 
 
 def test_steps_hold_for_every_kind_of_sprite_and_in_the_scene() -> None:
@@ -289,8 +299,10 @@ def test_four_quarter_turns_are_the_identity(
     """One quarter turn more turns the variant and its pivot by the array; four of them give it back."""
     sprite = sprite_of(mask, pivot)
     base = transform_of(sprite, 0, flip, scale, angle)
-    forms = [Transform(0, flip, base.scale_x, base.scale_y, (base.quarter + k) % 4, base.c, base.s) for k in range(5)]
-    made = [variant_of(sprite, form) for form in forms]
+    transforms = [
+        Transform(0, flip, base.scale_x, base.scale_y, (base.quarter + k) % 4, base.c, base.s) for k in range(5)
+    ]
+    made = [variant_of(sprite, transform) for transform in transforms]
     assert (made[4].pivot_x, made[4].pivot_y) == (made[0].pivot_x, made[0].pivot_y)
     assert np.array_equal(made[4].mask, made[0].mask)
     for before, after in itertools.pairwise(made):
@@ -350,8 +362,8 @@ def test_variants_are_cropped_counted_and_read_only() -> None:
 
 def test_an_empty_mask_stays_empty() -> None:
     sprite = as_sprite(np.zeros((4, 4), np.bool_))
-    for form in (Transform(), posed(sprite, angle=30), posed(sprite, scale=(3, 2), angle=91)):
-        variant = variant_of(sprite, form)
+    for transform in (Transform(), posed(sprite, angle=30), posed(sprite, scale=(3, 2), angle=91)):
+        variant = variant_of(sprite, transform)
         assert (variant.mask.shape, variant.area) == ((0, 0), 0)
 
 
@@ -364,12 +376,12 @@ def test_what_is_drawn_is_what_is_tested(
     image = np.random.default_rng(seed).integers(0, 256, (*mask.shape, 4)).astype(np.uint8)
     image[:, :, 3] = np.where(mask, image[:, :, 3] | 128, image[:, :, 3] & 127)
     sprite = Sprite.from_image(image, pivot_xy=None if pivot is None else (pivot[0] / 256, pivot[1] / 256))
-    form = posed(sprite, flip=flip, scale=scale, angle=angle)
-    drawn, pivot_x, pivot_y = picture_of(sprite, form, WHITE)
+    transform = posed(sprite, flip=flip, scale=scale, angle=angle)
+    drawn, pivot_x, pivot_y = picture_of(sprite, transform, WHITE)
     opaque = drawn[:, :, 3] > 127
     left, top = (128 - pivot_x) // 256, (128 - pivot_y) // 256
     drawn_at = {(int(x) + left, int(y) + top) for y, x in np.argwhere(opaque)}
-    assert drawn_at == pixels_of(variant_of(sprite, form), (0, 0))
+    assert drawn_at == pixels_of(variant_of(sprite, transform), (0, 0))
     known = {tuple(pixel) for pixel in image.reshape(-1, 4).tolist()} | {(0, 0, 0, 0)}
     assert {tuple(pixel) for pixel in drawn.reshape(-1, 4).tolist()} <= known
 
@@ -377,12 +389,12 @@ def test_what_is_drawn_is_what_is_tested(
 def test_a_plain_image_is_drawn_as_it_is() -> None:
     image = np.arange(3 * 4 * 4, dtype=np.uint8).reshape(3, 4, 4) * 5
     sprite = Sprite.from_image(image)
-    for form, expected in (
+    for transform, expected in (
         (Transform(), image),
         (Transform(flip="x"), image[:, ::-1]),
         (Transform(quarter=1), np.rot90(image, -1)),
     ):
-        assert np.array_equal(picture_of(sprite, form, WHITE)[0], expected)
+        assert np.array_equal(picture_of(sprite, transform, WHITE)[0], expected)
 
 
 @pytest.mark.parametrize(("own", "used"), [(None, (1, 2, 3)), ((9, 8, 7), (9, 8, 7))])
@@ -687,7 +699,7 @@ def test_the_cache_is_bounded_and_forgets_the_longest_unused(monkeypatch: pytest
         held = sum(v.mask.nbytes + VARIANT_BYTES for v in kept.values.values())
         assert kept.bytes == held <= 20_000
     assert len(kept.values) > 3
-    assert posed(sprite, angle=1) not in {form for _, form in kept.values}
+    assert posed(sprite, angle=1) not in {transform for _, transform in kept.values}
     large = as_sprite(np.ones((200, 200), np.bool_))
     assert variant_of(large, Transform()).area == 40_000  # one that is larger than the cache is made all the same
     assert kept.bytes == 40_000 + VARIANT_BYTES
@@ -716,10 +728,10 @@ COPIES: dict[str, Callable[[Sprite], Sprite]] = {
 }
 
 
-def answers(sprite: Sprite, form: Transform) -> list[Any]:
-    """All that a sprite tells of a form: mask, picture, volumes."""
-    variant = variant_of(sprite, form)
-    image, *pivot = picture_of(sprite, form, WHITE)
+def answers(sprite: Sprite, transform: Transform) -> list[Any]:
+    """All that a sprite tells of a transform: mask, picture, volumes."""
+    variant = variant_of(sprite, transform)
+    image, *pivot = picture_of(sprite, transform, WHITE)
     kinds = ("circle", "oriented box", "3 boxes", "polygon") if variant.area else ()
     volumes = [bounding(kind, [sprite], [variant]).bounds() for kind in kinds]
     return [
@@ -743,13 +755,13 @@ def test_a_copy_answers_as_the_sprite_that_it_came_from(
 ) -> None:
     """Also one from another process, which may have counted its sprites up to a number that one has here."""
     foreign, here = SOURCES[source](), SOURCES[other]()
-    form = posed(foreign, flip, scale, angle, frame % foreign.frame_count)
-    expected = answers(foreign, form)
-    own = answers(here, form._replace(frame=0)), answers(here, Transform())
+    transform = posed(foreign, flip, scale, angle, frame % foreign.frame_count)
+    expected = answers(foreign, transform)
+    own = answers(here, transform._replace(frame=0)), answers(here, Transform())
     object.__setattr__(foreign, "uid", here.uid)
     again = COPIES[copied](foreign)
-    assert answers(again, form) == expected
-    assert (answers(here, form._replace(frame=0)), answers(here, Transform())) == own
+    assert answers(again, transform) == expected
+    assert (answers(here, transform._replace(frame=0)), answers(here, Transform())) == own
     assert not any(one.mask.flags.writeable for one in again.frames)
     assert not any(one.image.flags.writeable for one in again.frames if one.image is not None)
 
@@ -819,8 +831,8 @@ def test_a_circle_has_one_mask_at_all_angles() -> None:
     upright = variant_of(circle, posed(circle))
     for angle in (0.1, 45, 90, 271.5, 359):
         assert variant_of(circle, posed(circle, angle=angle)) is upright
-        form = posed(circle, angle=angle)
-        spans = rasterize.ellipse(circle.outline.radius, circle.outline.radius, *form.direction)  # type: ignore[union-attr]
+        transform = posed(circle, angle=angle)
+        spans = rasterize.ellipse(circle.outline.radius, circle.outline.radius, *transform.direction)  # type: ignore[union-attr]
         assert np.array_equal(spans.to_mask()[0], upright.mask)
         assert variant_of(circle, posed(circle, scale=(2, 2), angle=angle)) is variant_of(
             circle, posed(circle, scale=(2, 2))
@@ -852,10 +864,10 @@ def test_shapes_made_together_are_those_of_each_alone(rng: random.Random, count:
         for _ in makers
     ]  # fmt: skip
     sprites, others = ([make() for make in makers] for _ in range(2))
-    forms = [posed(sprite, **pose) for sprite, pose in zip(sprites, poses, strict=True)]
-    together = variants_of(sprites, forms)
-    for one, other, form in zip(together, others, forms, strict=True):
-        alone = variant_of(other, form)
+    transforms = [posed(sprite, **pose) for sprite, pose in zip(sprites, poses, strict=True)]
+    together = variants_of(sprites, transforms)
+    for one, other, transform in zip(together, others, transforms, strict=True):
+        alone = variant_of(other, transform)
         assert np.array_equal(one.mask, alone.mask) and one.area == alone.area
         assert (one.pivot_x, one.pivot_y) == (alone.pivot_x, alone.pivot_y)
 

@@ -310,13 +310,13 @@ def _inside(folder: Path, text: str, field: str = "image") -> Path:
 
 def _object_json(scene: Scene, row: int, source: dict[str, Any]) -> dict[str, Any]:
     """An object with its source as JSON; what it has by default is left out."""
-    items, form = scene.items, scene.items.forms[row]
+    items, transform = scene.items, scene.items.transforms[row]
     item, bits = int(items.id[row]), int(items.categories[row])
     pose = {
         "angle": (items.angles[row], 0),
-        "scale": ([form.scale_x / ONE, form.scale_y / ONE], [1, 1]),
-        "flip": (form.flip, "none"),
-        "frame": (form.frame, 0),
+        "scale": ([transform.scale_x / ONE, transform.scale_y / ONE], [1, 1]),
+        "flip": (transform.flip, "none"),
+        "frame": (transform.frame, 0),
         "layer": (int(items.layer[row]), 0),
         "cost": (int(items.cost[row]), 1),
         "velocity_xy": ((items.velocity_256[row] / SUB).tolist(), [0, 0]),

@@ -52,7 +52,7 @@ def carved_sprites(items: Items, pixels: Mapping[int, object]) -> tuple[list[Spr
     """New sprites of the items of which pixels go, and how many pixels each of them loses; all by their rows."""
     sprites, lost = [], {}
     for row, xy in pixels.items():
-        variant = replace(items.variants[row], form=items.forms[row])  # a circle's is kept unturned
+        variant = replace(items.variants[row], transform=items.transforms[row])  # a circle's is kept unturned
         place = f"pixels[{items.id[row]}]"
         hole = hole_of(place, xy, variant.mask, items.corner(row))
         if count := int(np.count_nonzero(hole.hit)):
@@ -95,22 +95,22 @@ def hole_of(field: str, pixels: object, mask: Bools, corner_xy: tuple[int, int])
 
 def carved(sprite: Sprite, variant: Variant, hole: Hole) -> Sprite:
     """A sprite without some pixels, a hole, of its mask in one pose, a variant; all others of that mask stay."""
-    form = variant.form
-    cells = _fine_cells(sprite, form)
-    gone, per_px, (_, pivot) = cells.gone, cells.per_px, local_grid(sprite, form.frame)
+    transform = variant.transform
+    cells = _fine_cells(sprite, transform)
+    gone, per_px, (_, pivot) = cells.gone, cells.per_px, local_grid(sprite, transform.frame)
     rest = _rest_of(variant, hole)
     if not rest.area:
         gone[:] = True  # no sliver that has no pixel in this pose comes back in another
     out = _with_rim(variant.mask, hole)
-    near = zip(_cells_near(form, variant, out, per_px, pivot), gone.shape[::-1], strict=True)
+    near = zip(_cells_near(transform, variant, out, per_px, pivot), gone.shape[::-1], strict=True)
     columns, rows = (np.arange(max(first, 0), min(last, count)) for (first, last), count in near)
     if len(columns) and len(rows):
-        x, y = _pixels_of_cells(form, variant, per_px, pivot, (columns, rows))
+        x, y = _pixels_of_cells(transform, variant, per_px, pivot, (columns, rows))
         height, width = out.hit.shape  # whose outermost pixels do not go
         part = out.hit[(y - out.y).clip(0, height - 1), (x - out.x).clip(0, width - 1)]
         gone[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1] |= part
     gone.flags.writeable = False
-    made = replace(sprite, carvings={**sprite.carvings, form.frame: Carving(gone, per_px)})
+    made = replace(sprite, carvings={**sprite.carvings, transform.frame: Carving(gone, per_px)})
     keep_variant(made, rest)
     return made
 
@@ -120,33 +120,33 @@ def _rest_of(variant: Variant, hole: Hole) -> Variant:
     mask = variant.mask.copy()
     hole.of(mask)[hole.hit] = False
     if not (mask[0].any() and mask[-1].any() and mask[:, 0].any() and mask[:, -1].any()):
-        return cropped(variant.form, mask, (variant.pivot_x, variant.pivot_y))
+        return cropped(variant.transform, mask, (variant.pivot_x, variant.pivot_y))
     mask.flags.writeable = False
     left = variant.area - int(np.count_nonzero(hole.hit))
-    return Variant(variant.form, mask, variant.pivot_x, variant.pivot_y, left)
+    return Variant(variant.transform, mask, variant.pivot_x, variant.pivot_y, left)
 
 
-def cells_per_px(form: Transform) -> int:
+def cells_per_px(transform: Transform) -> int:
     """Number of cells along a pixel that carving in a pose needs, a power of two.
 
     A cell that a pixel's centre falls on has its own centre at most scale / (2 * number) px from it along each axis of
     the sprite; its centre has to stay in the pixel, half a px around.
     """
-    if form.plain:
+    if transform.plain:
         return 1
-    x, y = form.scale_x, form.scale_y
-    reach = max(x, y) if form.s == 0 else math.isqrt(x * x + y * y) + 1
+    x, y = transform.scale_x, transform.scale_y
+    reach = max(x, y) if transform.s == 0 else math.isqrt(x * x + y * y) + 1
     number = 1
     while number * ONE * SLACK[1] <= reach * SLACK[0]:
         number *= 2
     return number
 
 
-def _fine_cells(sprite: Sprite, form: Transform) -> Carving:
+def _fine_cells(sprite: Sprite, transform: Transform) -> Carving:
     """A copy of the carving of a sprite's frame with cells that are fine enough for a pose."""
-    (width, height), _ = local_grid(sprite, form.frame)
-    known = sprite.carvings.get(form.frame, Carving(np.zeros((height, width), np.bool_)))
-    per_px = max(cells_per_px(form), known.per_px)
+    (width, height), _ = local_grid(sprite, transform.frame)
+    known = sprite.carvings.get(transform.frame, Carving(np.zeros((height, width), np.bool_)))
+    per_px = max(cells_per_px(transform), known.per_px)
     if not fits(width * per_px, height * per_px):
         cut = f"that can be cut into {per_px} x {per_px} cells a px, {MASK_AREA_MAX} in all"
         raise InputError(f"sprite: expected one {cut}, got {width} x {height} px")
@@ -180,14 +180,16 @@ def _around(mask: Bools) -> Bools:
     return wide
 
 
-def _cells_near(form: Transform, variant: Variant, hole: Hole, per_px: int, pivot: tuple[int, int]) -> list[list[int]]:
+def _cells_near(
+    transform: Transform, variant: Variant, hole: Hole, per_px: int, pivot: tuple[int, int]
+) -> list[list[int]]:
     """First and last + 1 of the columns and of the rows of cells that may lie in a hole of a variant."""
     x, y = (np.array([at, at + n]) for at, n in zip(hole[1:], hole.hit.shape[::-1], strict=True))
     corners = np.array([[i, j] for i in x.tolist() for j in y.tolist()]) * SUB - HALF
     corners -= variant.pivot_x, variant.pivot_y
-    c, s = form.direction
-    scale = np.array([form.scale_x, form.scale_y])
-    back = rounded_div(turned(corners, c, -s) * ONE, scale) * form.signs + pivot + HALF
+    c, s = transform.direction
+    scale = np.array([transform.scale_x, transform.scale_y])
+    back = rounded_div(turned(corners, c, -s) * ONE, scale) * transform.signs + pivot + HALF
     margin = 2 + 2 * per_px * ONE // (SUB * int(scale.min()))  # positions were rounded to 1/256 px
     cells = back * per_px // SUB
     bounds: list[list[int]] = np.stack([cells.min(axis=0) - margin, cells.max(axis=0) + margin], axis=1).tolist()
@@ -195,13 +197,13 @@ def _cells_near(form: Transform, variant: Variant, hole: Hole, per_px: int, pivo
 
 
 def _pixels_of_cells(
-    form: Transform, variant: Variant, per_px: int, pivot: tuple[int, int], cells: tuple[Ints, Ints]
+    transform: Transform, variant: Variant, per_px: int, pivot: tuple[int, int], cells: tuple[Ints, Ints]
 ) -> tuple[Ints, Ints]:
     """Column and row (h, w) of a variant's grid in which the centres of cells lie."""
-    c, s = form.direction
+    (c, s), scales = transform.direction, (transform.scale_x, transform.scale_y)
     x, y = (
         rounded_div(((2 * cell + 1 - per_px) * SUB - 2 * per_px * at) * int(sign) * scale, 2 * per_px * ONE)
-        for cell, at, sign, scale in zip(cells, pivot, form.signs, (form.scale_x, form.scale_y), strict=True)
+        for cell, at, sign, scale in zip(cells, pivot, transform.signs, scales, strict=True)
     )
     across, down = x[None, :], y[:, None]
     return (

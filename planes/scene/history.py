@@ -166,17 +166,17 @@ class PastItems(Items):
         for name in COLUMNS:
             setattr(self, name, getattr(self, name).copy())
         self.atlas = _full(self.atlas.flat)
-        self.angles, self.forms, self.variants = list(self.angles), list(self.forms), list(self.variants)
+        self.angles, self.transforms, self.variants = list(self.angles), list(self.transforms), list(self.variants)
         looks = self.looks(list(angles)).changed(None, list(angles.values()), None, None, None)
         try:
-            variants = variants_of(looks.sprites, looks.forms)
+            variants = variants_of(looks.sprites, looks.transforms)
         except InputError:
-            for row, sprite, angle, form in zip(angles, *looks, strict=True):
+            for row, sprite, angle, transform in zip(angles, *looks, strict=True):
                 with within(f"object {self.id[row]} at {angle:.15g} degrees"):
-                    variant_of(sprite, form)
+                    variant_of(sprite, transform)
             raise
-        for row, angle, form in zip(angles, looks.angles, looks.forms, strict=True):
-            self.angles[row], self.forms[row] = angle, form
+        for row, angle, transform in zip(angles, looks.angles, looks.transforms, strict=True):
+            self.angles[row], self.transforms[row] = angle, transform
         self._enter(list(angles), variants)
         for name in COLUMNS:
             _sealed(getattr(self, name))

@@ -170,7 +170,7 @@ NOTHING = Sprite(frames=())  # sprite of a row without an object
 NO_TRANSFORM = Transform()  # transform of a row without an object
 NO_MASK = Variant(NO_TRANSFORM, np.zeros((0, 0), np.bool_), 0, 0, 0)  # mask of a row without an object
 
-EMPTY = {"sprites": NOTHING, "angles": 0.0, "forms": NO_TRANSFORM, "variants": NO_MASK, "names": ""}
+EMPTY = {"sprites": NOTHING, "angles": 0.0, "transforms": NO_TRANSFORM, "variants": NO_MASK, "names": ""}
 """The lists of items, and what they have in a row without an object."""
 
 NO_EDGE = np.array([HALF, HALF, HALF - SUB, HALF - SUB])  # of an empty box
@@ -217,7 +217,7 @@ class Items:
         self.version = 0
         self.atlas = MaskAtlas()
         self.sprites: list[Sprite] = []
-        self.forms: list[Transform] = []
+        self.transforms: list[Transform] = []
         self.angles: list[float] = []
         self.variants: list[Variant] = []
         self.names: list[str] = []
@@ -238,13 +238,13 @@ class Items:
     def _allot(self) -> None:
         vars(self).update(_rows_without_items(16))
 
-    def add(self, sprite: Sprite, form: Transform, angle: float, name: str, values: dict[str, object]) -> int:
+    def add(self, sprite: Sprite, transform: Transform, angle: float, name: str, values: dict[str, object]) -> int:
         """Add an item with its columns `values`, and return its id; its mask is made later."""
-        if not surely_fits(sprite, form):
-            variants_of([sprite], [form])
+        if not surely_fits(sprite, transform):
+            variants_of([sprite], [transform])
         item, row = self.table.add()
         self._reserve(self.table.height)
-        self.sprites[row], self.forms[row], self.angles[row], self.names[row] = sprite, form, angle, name
+        self.sprites[row], self.transforms[row], self.angles[row], self.names[row] = sprite, transform, angle, name
         for column, value in values.items():
             getattr(self, column)[row] = value
         self.id[row] = item
@@ -272,7 +272,7 @@ class Items:
             getattr(items, name)[:count] = state[name]
         vars(items).update({name: state[name] for name in (*Looks._fields, "names")})
         looks = items.looks(range(count))
-        items._enter(range(count), variants_of(looks.sprites, looks.forms))
+        items._enter(range(count), variants_of(looks.sprites, looks.transforms))
         items.record(np.arange(count))
         return items
 
@@ -339,15 +339,15 @@ class Items:
 
     def looks(self, rows: Sequence[int]) -> Looks:
         """What the masks of items are made of."""
-        sprites, angles, forms = self.sprites, self.angles, self.forms
-        return Looks([sprites[row] for row in rows], [angles[row] for row in rows], [forms[row] for row in rows])
+        sprites, angles, transforms = self.sprites, self.angles, self.transforms
+        return Looks([sprites[row] for row in rows], [angles[row] for row in rows], [transforms[row] for row in rows])
 
     def reform(self, rows: Sequence[int], looks: Looks) -> None:
         """Give items other looks; their masks are made later, but if any is too large, no item changes."""
-        if not all(map(surely_fits, looks.sprites, looks.forms)):
-            variants_of(looks.sprites, looks.forms)
-        for row, sprite, angle, form in zip(rows, *looks, strict=True):
-            self.sprites[row], self.angles[row], self.forms[row] = sprite, angle, form
+        if not all(map(surely_fits, looks.sprites, looks.transforms)):
+            variants_of(looks.sprites, looks.transforms)
+        for row, sprite, angle, transform in zip(rows, *looks, strict=True):
+            self.sprites[row], self.angles[row], self.transforms[row] = sprite, angle, transform
         self._make_later(rows)
 
     def _make_later(self, rows: Sequence[int]) -> None:
@@ -360,7 +360,7 @@ class Items:
         with self._lock:  # threads may read a scene at once
             if rows := [row for row in self.unmade if self.sprites[row] is not NOTHING]:
                 looks = self.looks(rows)
-                variants = variants_of(looks.sprites, looks.forms)
+                variants = variants_of(looks.sprites, looks.transforms)
                 for row in rows:
                     self.atlas.drop(self.variants[row])
                 self._enter(rows, variants)

@@ -69,13 +69,13 @@ class Looks(NamedTuple):
 
     sprites: list[Sprite]
     angles: list[float]
-    forms: list[Transform]
+    transforms: list[Transform]
 
     def changed(self, sprite: object, angle: object, scale: object, flip: object, frame: object) -> Looks:
         """Looks after a change, of which each part is one for all, one per object, or None for no change."""
         n = len(self.sprites)
         sprites, angles = self.sprites, self.angles
-        columns: Iterable[Any] = zip(*self.forms, strict=True) if n else ((),) * len(Transform())
+        columns: Iterable[Any] = zip(*self.transforms, strict=True) if n else ((),) * len(Transform())
         frames, flips, x, y, *turns = columns
         if sprite is not None:
             sprites = _sprite_rows(sprite, n)

@@ -42,7 +42,7 @@ def draw_view(items: Items, view_xyxy: Box, screen_xy: tuple[int, int] | None = 
         if _beyond(items, row, view_xyxy):
             continue
         role = ROLES[int(items.role[row])]
-        image, pivot_x, pivot_y = picture_of(items.sprites[row], items.forms[row], BARE[role])
+        image, pivot_x, pivot_y = picture_of(items.sprites[row], items.transforms[row], BARE[role])
         left, top = pixel(items.position_256[row] - (pivot_x, pivot_y)).tolist()
         if role is Role.HUD:
             left, top = left + screen_x, top + screen_y
@@ -67,12 +67,13 @@ def blend(
 
 def _beyond(items: Items, row: int, view_xyxy: Box) -> bool:
     """Whether an image surely lies out of view: its pivot is farther away than its sides and scale can reach."""
-    sprite, form = items.sprites[row], items.forms[row]
+    sprite, transform = items.sprites[row], items.transforms[row]
     if not sprite.frames or ROLES[int(items.role[row])] is Role.HUD:
         return False
-    height, width = sprite.frames[form.frame].mask.shape
-    pivot = max(map(abs, frame_pivot(sprite, sprite.frames[form.frame]))) // SUB
-    reach = (height + width + 2 * pivot + 2) * (max(form.scale_x, form.scale_y, 1 << SCALE_BITS) >> SCALE_BITS) * 2
+    height, width = sprite.frames[transform.frame].mask.shape
+    pivot = max(map(abs, frame_pivot(sprite, sprite.frames[transform.frame]))) // SUB
+    scale = max(transform.scale_x, transform.scale_y, 1 << SCALE_BITS) >> SCALE_BITS
+    reach = (height + width + 2 * pivot + 2) * scale * 2
     x, y = pixel(items.position_256[row]).tolist()
     return not (view_xyxy[0] - reach <= x <= view_xyxy[2] + reach and view_xyxy[1] - reach <= y <= view_xyxy[3] + reach)
 

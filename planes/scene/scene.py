@@ -169,11 +169,11 @@ class Scene:
             Naming the field.
         """
         made, kind, turn = as_sprite(sprite), _role(role), real("angle", angle, -FLOAT_MAX, FLOAT_MAX)
-        form = transform_of(made, frame, flip, scale_pair(scale), turn)
+        transform = transform_of(made, frame, flip, scale_pair(scale), turn)
         values = self._new_columns(kind, layer, categories, owner, cost, position_xy, velocity_xy)
         unnamed = name is None or (isinstance(name, str) and not name)
         called = f"{kind.value} {self._items.count}" if unnamed else Text().check("name", name)
-        return self._items.add(made, form, turn, called, values)
+        return self._items.add(made, transform, turn, called, values)
 
     def _new_columns(
         self, role: Role, layer: object, categories: object, owner: object, cost: object, position_xy: object,
@@ -319,15 +319,15 @@ class Scene:
 
     def scale(self, ids: int | Sequence[int] | Ints) -> Floats:
         """Scales (n, 2) of ids in x and y, or (2,) of one; they are kept in 1/65536."""
-        return self._read(ids, lambda rows: self._forms(rows, "scale_x", "scale_y") / (1 << SCALE_BITS))
+        return self._read(ids, lambda rows: self._transforms(rows, "scale_x", "scale_y") / (1 << SCALE_BITS))
 
     def flip(self, ids: int | Sequence[int] | Ints) -> npt.NDArray[np.str_]:
         """Flips (n,) of ids, or that of one: "none", "x", "y" or "xy"."""
-        return self._read(ids, lambda rows: self._forms(rows, "flip")[:, 0])
+        return self._read(ids, lambda rows: self._transforms(rows, "flip")[:, 0])
 
     def frame(self, ids: int | Sequence[int] | Ints) -> Ints:
         """Numbers (n,) of the frames of ids, or that of one."""
-        return self._read(ids, lambda rows: self._forms(rows, "frame")[:, 0])
+        return self._read(ids, lambda rows: self._transforms(rows, "frame")[:, 0])
 
     def layer(self, ids: int | Sequence[int] | Ints) -> Ints:
         """Layers (n,) of ids, or that of one; greater is nearer the viewer."""
@@ -483,10 +483,11 @@ class Scene:
         read = values(self._living(ids))
         return read if np.ndim(ids) else read[0]  # type: ignore[arg-type]
 
-    def _forms(self, rows: Ints, *names: str) -> npt.NDArray[Any]:
+    def _transforms(self, rows: Ints, *names: str) -> npt.NDArray[Any]:
         """Columns of the transforms of objects."""
-        forms = self._items.looks(rows.tolist()).forms
-        return np.array([[getattr(form, name) for name in names] for form in forms]).reshape(-1, len(names))
+        transforms = self._items.looks(rows.tolist()).transforms
+        values = np.array([[getattr(transform, name) for name in names] for transform in transforms])
+        return values.reshape(-1, len(names))
 
     def _living(self, ids: object) -> Ints:
         """Rows of ids, which are checked to be in the scene."""

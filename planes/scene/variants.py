@@ -99,16 +99,16 @@ def whole_scale(x: float, y: float) -> tuple[int, int]:
     return round(x * ONE), round(y * ONE)
 
 
-def surely_fits(sprite: Sprite, form: Transform) -> bool:
+def surely_fits(sprite: Sprite, transform: Transform) -> bool:
     """Whether a mask surely is not too large, by the sum of the sides of its sprite, which no turn makes longer."""
-    return sprite.sides * max(form.scale_x, form.scale_y) <= SIDES_SURE * ONE
+    return sprite.sides * max(transform.scale_x, transform.scale_y) <= SIDES_SURE * ONE
 
 
 @dataclass(eq=False)  # a frozen one takes six times as long to make
 class Variant:
     """The mask of a sprite in one pose, cropped and read-only, with its pivot in 1/256 px from the centre of [0, 0]."""
 
-    form: Transform
+    transform: Transform
     mask: Bools
     pivot_x: int
     pivot_y: int
@@ -121,28 +121,28 @@ _kept: LruCache[tuple[int, Transform], Variant] = LruCache(
 )
 
 
-def variant_of(sprite: Sprite, form: Transform) -> Variant:
+def variant_of(sprite: Sprite, transform: Transform) -> Variant:
     """Mask of a transformed sprite; the last used masks are cached."""
-    return variants_of([sprite], [form])[0]
+    return variants_of([sprite], [transform])[0]
 
 
-def variants_of(sprites: Sequence[Sprite], forms: Sequence[Transform]) -> list[Variant]:
-    """Masks of transformed sprites, a form each; those that are not cached are made together."""
-    keys = [(sprite.uid, _unturned(sprite, form)) for sprite, form in zip(sprites, forms, strict=True)]
+def variants_of(sprites: Sequence[Sprite], transforms: Sequence[Transform]) -> list[Variant]:
+    """Masks of sprites, each with its transform; those that are not cached are made together."""
+    keys = [(sprite.uid, _unturned(sprite, transform)) for sprite, transform in zip(sprites, transforms, strict=True)]
     return _kept.get_all(keys, lambda rows: _made([sprites[row] for row in rows], [keys[row][1] for row in rows]))
 
 
-def _unturned(sprite: Sprite, form: Transform) -> Transform:
-    """The form itself; of a circle, whose mask is the same at every angle, one that is not turned."""
+def _unturned(sprite: Sprite, transform: Transform) -> Transform:
+    """The transform itself; of a circle, whose mask is the same at every angle, one that is not turned."""
     outline = sprite.outline
-    if outline is None or outline.radius is None or form.scale_x != form.scale_y or sprite.carvings:
-        return form
-    return form._replace(quarter=0, c=1 << TRIG_BITS, s=0)
+    if outline is None or outline.radius is None or transform.scale_x != transform.scale_y or sprite.carvings:
+        return transform
+    return transform._replace(quarter=0, c=1 << TRIG_BITS, s=0)
 
 
 def keep_variant(sprite: Sprite, variant: Variant) -> None:
     """Cache the mask of a sprite that was just made, in the pose in which it was made."""
-    _kept.get((sprite.uid, variant.form), lambda: variant)
+    _kept.get((sprite.uid, variant.transform), lambda: variant)
 
 
 @dataclass
@@ -195,107 +195,107 @@ class MaskAtlas:
         self.used = ends[-1]
 
 
-def picture_of(sprite: Sprite, form: Transform, color: tuple[int, int, int]) -> tuple[Image, int, int]:
+def picture_of(sprite: Sprite, transform: Transform, color: tuple[int, int, int]) -> tuple[Image, int, int]:
     """Image (h, w, 4) of a transformed sprite, and its pivot (x, y) in 1/256 px; a mask is filled with `color`."""
-    frame = sprite.frames[form.frame] if sprite.frames else None
+    frame = sprite.frames[transform.frame] if sprite.frames else None
     if frame is None or frame.image is None:
-        variant = variant_of(sprite, form)
+        variant = variant_of(sprite, transform)
         image = np.zeros((*variant.mask.shape, 4), np.uint8)
         image[variant.mask] = (*(sprite.color or color), 255)
         return image, variant.pivot_x, variant.pivot_y
-    mask, (x, y) = _flipped_frame(sprite, form)
-    image = _flipped(frame.image, form.flip)
-    if form.plain:
-        image, x, y = quarter_turned(image, x, y, form.quarter)
+    mask, (x, y) = _flipped_frame(sprite, transform)
+    image = _flipped(frame.image, transform.flip)
+    if transform.plain:
+        image, x, y = quarter_turned(image, x, y, transform.quarter)
     else:
         only = np.zeros(1, np.int64)
-        grids = _grids_of([(*mask.shape[::-1], x, y)], only, [form])
+        grids = _grids_of([(*mask.shape[::-1], x, y)], only, [transform])
         image = _mapped(grids, [mask], only, [image])[0]
         x, y = grids.pivot_256[0].tolist()
-    if form.frame in sprite.carvings:
+    if transform.frame in sprite.carvings:
         image = image.copy()
-        image[~_left(sprite, form, image.shape[1::-1], (x, y), masked=False), 3] = 0
+        image[~_left(sprite, transform, image.shape[1::-1], (x, y), masked=False), 3] = 0
     return image, x, y
 
 
-def _made(sprites: Sequence[Sprite], forms: Sequence[Transform]) -> list[Variant]:
+def _made(sprites: Sequence[Sprite], transforms: Sequence[Transform]) -> list[Variant]:
     """Make masks; frames that are scaled, or turned by more than quarter turns, are mapped together."""
-    if len(forms) > 1:
+    if len(transforms) > 1:
         keep_arena()
     made, mapped, polygons = {}, {}, {}
-    for row, (sprite, form) in enumerate(zip(sprites, forms, strict=True)):
+    for row, (sprite, transform) in enumerate(zip(sprites, transforms, strict=True)):
         if sprite.outline is not None and sprite.outline.radius is not None:
-            made[row] = _of_shape(form, *_ellipse_of(sprite, sprite.outline.radius, form).to_mask())
+            made[row] = _of_shape(transform, *_ellipse_of(sprite, sprite.outline.radius, transform).to_mask())
         elif sprite.outline is not None:
-            polygons[row] = sprite, form
-        elif form.plain:
-            mask, pivot = _flipped_frame(sprite, form)
-            mask, x, y = quarter_turned(mask, *pivot, form.quarter)
-            made[row] = cropped(form, mask, (x, y))
+            polygons[row] = sprite, transform
+        elif transform.plain:
+            mask, pivot = _flipped_frame(sprite, transform)
+            mask, x, y = quarter_turned(mask, *pivot, transform.quarter)
+            made[row] = cropped(transform, mask, (x, y))
         else:
-            mapped[row] = sprite, form
+            mapped[row] = sprite, transform
     if mapped:
         made |= zip(mapped, _mapped_frames(*zip(*mapped.values(), strict=True)), strict=True)
     made |= _polygons_of(polygons)
-    for row, (sprite, form) in enumerate(zip(sprites, forms, strict=True)):
-        if form.frame in sprite.carvings and made[row].area:
+    for row, (sprite, transform) in enumerate(zip(sprites, transforms, strict=True)):
+        if transform.frame in sprite.carvings and made[row].area:
             mask, pivot = made[row].mask, (made[row].pivot_x, made[row].pivot_y)
-            made[row] = cropped(form, mask & _left(sprite, form, mask.shape[::-1], pivot, masked=True), pivot)
-    return [made[row] for row in range(len(forms))]
+            made[row] = cropped(transform, mask & _left(sprite, transform, mask.shape[::-1], pivot, masked=True), pivot)
+    return [made[row] for row in range(len(transforms))]
 
 
 def _left(
-    sprite: Sprite, form: Transform, size_wh: tuple[int, int], pivot_256: tuple[int, int], *, masked: bool
+    sprite: Sprite, transform: Transform, size_wh: tuple[int, int], pivot_256: tuple[int, int], *, masked: bool
 ) -> Bools:
     """Which pixels (h, w) of a grid about the pivot of a transformed sprite its carving leaves.
 
     A pixel is left if its centre, mapped back, lies in the closed square of a cell that is left, and in the frame's
     mask if `masked`.
     """
-    carving, (size, pivot) = sprite.carvings[form.frame], local_grid(sprite, form.frame)
+    carving, (size, pivot) = sprite.carvings[transform.frame], local_grid(sprite, transform.frame)
     left = ~carving.gone
     if masked and sprite.outline is None:
-        left &= sprite.frames[form.frame].mask.repeat(carving.per_px, axis=0).repeat(carving.per_px, axis=1)
-    left, (x, y) = _flipped(left, form.flip), _flipped_pivot(size, pivot, form.flip)
-    if form.plain and carving.per_px == 1:
-        turned_left, x, y = quarter_turned(left, x, y, form.quarter)
+        left &= sprite.frames[transform.frame].mask.repeat(carving.per_px, axis=0).repeat(carving.per_px, axis=1)
+    left, (x, y) = _flipped(left, transform.flip), _flipped_pivot(size, pivot, transform.flip)
+    if transform.plain and carving.per_px == 1:
+        turned_left, x, y = quarter_turned(left, x, y, transform.quarter)
         row, column = (y - pivot_256[1]) // SUB, (x - pivot_256[0]) // SUB
         return turned_left[row : row + size_wh[1], column : column + size_wh[0]]
-    c, s = form.direction
+    c, s = transform.direction
     back, at = np.array([[c, s], [-s, c]]), np.array(pivot_256)
-    fine = np.array([form.scale_x, form.scale_y]) << FINE_BITS
+    fine = np.array([transform.scale_x, transform.scale_y]) << FINE_BITS
     first = (np.array([x, y]) + HALF) * fine - (back * at).sum(axis=1)
     grid = Grids(at[None], np.array([size_wh]), first[None], (SUB * back)[None], (SUB * fine // carving.per_px)[None])
     out: Bools = _mapped(grid, [left], np.zeros(1, np.int64), [left])[0]
     return out
 
 
-def cropped(form: Transform, mask: Bools, pivot_256: tuple[int, int]) -> Variant:
+def cropped(transform: Transform, mask: Bools, pivot_256: tuple[int, int]) -> Variant:
     """Variant of the part of a mask that holds all its set pixels; `pivot_256` is from the centre of its [0, 0]."""
     rows, columns = (np.flatnonzero(mask.any(axis=axis)).tolist() for axis in (1, 0))
     if not rows:
-        return Variant(form, frozen(np.zeros((0, 0), np.bool_)), 0, 0, 0)
+        return Variant(transform, frozen(np.zeros((0, 0), np.bool_)), 0, 0, 0)
     part = frozen(mask[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1])
     x, y = pivot_256[0] - SUB * columns[0], pivot_256[1] - SUB * rows[0]
-    return Variant(form, part, x, y, int(np.count_nonzero(part)))
+    return Variant(transform, part, x, y, int(np.count_nonzero(part)))
 
 
-def _mapped_frames(sprites: Sequence[Sprite], forms: Sequence[Transform]) -> list[Variant]:
+def _mapped_frames(sprites: Sequence[Sprite], transforms: Sequence[Transform]) -> list[Variant]:
     """Variants of frames that are mapped inversely; a frame that several of them show is flipped once."""
     numbers: dict[tuple[int, int, str], int] = {}
     which: list[int] = []
     frames: list[tuple[Bools, tuple[int, int]]] = []
-    for sprite, form in zip(sprites, forms, strict=True):
-        key = sprite.uid, form.frame, form.flip
+    for sprite, transform in zip(sprites, transforms, strict=True):
+        key = sprite.uid, transform.frame, transform.flip
         number = numbers.setdefault(key, len(frames))
         if number == len(frames):
-            frames.append(_flipped_frame(sprite, form))
+            frames.append(_flipped_frame(sprite, transform))
         which.append(number)
     own = np.array(which)
-    grids = _grids_of([(*mask.shape[::-1], *pivot) for mask, pivot in frames], own, forms)
+    grids = _grids_of([(*mask.shape[::-1], *pivot) for mask, pivot in frames], own, transforms)
     found = kernels_of(sys.modules[__name__]).turned_masks([mask for mask, _ in frames], own, grids)
     pivots = np.where(found.area[:, None] > 0, grids.pivot_256 - SUB * found.corner_xy, 0)
-    columns = forms, found.masks, *pivots.T.tolist(), found.area.tolist()
+    columns = transforms, found.masks, *pivots.T.tolist(), found.area.tolist()
     return list(map(Variant, *columns))
 
 
@@ -351,7 +351,7 @@ class Grids(NamedTuple):
     unit: Ints  # (n, 2) number of parts of a column, and of a row
 
 
-def _grids_of(frames: Sequence[tuple[int, int, int, int]], which: Ints, forms: Sequence[Transform]) -> Grids:
+def _grids_of(frames: Sequence[tuple[int, int, int, int]], which: Ints, transforms: Sequence[Transform]) -> Grids:
     """Grids of frames, each given by its width, its height and its pivot (x, y); `which` (n,) is each grid's frame.
 
     The pivot keeps its offset from the pixel grid. If the frame is scaled, its edges decide the offset, to half a
@@ -360,7 +360,7 @@ def _grids_of(frames: Sequence[tuple[int, int, int, int]], which: Ints, forms: S
     """
     frame = np.array(frames).take(which, axis=0)
     size, pivot = frame[:, :2], frame[:, 2:]
-    _, _, scale_x, scale_y, quarter, *rest = zip(*forms, strict=True)
+    _, _, scale_x, scale_y, quarter, *rest = zip(*transforms, strict=True)
     scale, turn = np.array([scale_x, scale_y]).T, QUARTERS.take(quarter, axis=0)
     axis = turn @ np.array(rest).T[..., None]
     forth = np.concatenate([axis, QUARTERS[1] @ axis], axis=2)  # the matrix of the turn, [[c, -s], [s, c]]
@@ -379,8 +379,8 @@ def _grids_of(frames: Sequence[tuple[int, int, int, int]], which: Ints, forms: S
     held -= SUB * ((held + low) // SUB)
     size_wh = (high + held) // SUB + 1
     if not fits(1, size_wh.max()) or size_wh.prod(axis=1).max() > MASK_AREA_MAX:
-        for form, (width, height) in zip(forms, size_wh.tolist(), strict=True):
-            check_size("scale" if form.scaled else "angle", width, height)
+        for transform, (width, height) in zip(transforms, size_wh.tolist(), strict=True):
+            check_size("scale" if transform.scaled else "angle", width, height)
     fine = scale << FINE_BITS
     first = (pivot + HALF) * fine - (back @ held[..., None])[..., 0]
     return Grids(held, size_wh, first, SUB * back, SUB * fine)
@@ -478,11 +478,11 @@ def _flipped(array: npt.NDArray[Any], flip: str) -> npt.NDArray[Any]:
     return array[:: -1 if flip in ("y", "xy") else 1, :: -1 if "x" in flip else 1]
 
 
-def _flipped_frame(sprite: Sprite, form: Transform) -> tuple[Bools, tuple[int, int]]:
+def _flipped_frame(sprite: Sprite, transform: Transform) -> tuple[Bools, tuple[int, int]]:
     """Flipped mask of a frame, and its pivot (x, y) in 1/256 px."""
-    frame = sprite.frames[form.frame]
+    frame = sprite.frames[transform.frame]
     h, w = frame.mask.shape
-    return _flipped(frame.mask, form.flip), _flipped_pivot((w, h), frame_pivot(sprite, frame), form.flip)
+    return _flipped(frame.mask, transform.flip), _flipped_pivot((w, h), frame_pivot(sprite, frame), transform.flip)
 
 
 def _flipped_pivot(size_wh: tuple[int, int], pivot_256: tuple[int, int], flip: str) -> tuple[int, int]:
@@ -491,9 +491,9 @@ def _flipped_pivot(size_wh: tuple[int, int], pivot_256: tuple[int, int], flip: s
     return SUB * (w - 1) - x if "x" in flip else x, SUB * (h - 1) - y if flip in ("y", "xy") else y
 
 
-def _of_shape(form: Transform, mask: Bools, corner_xy: tuple[int, int]) -> Variant:
+def _of_shape(transform: Transform, mask: Bools, corner_xy: tuple[int, int]) -> Variant:
     """Variant of a shape that was filled, from its mask and the position of the mask's pixel [0, 0]."""
-    return Variant(form, frozen(mask), -SUB * corner_xy[0], -SUB * corner_xy[1], int(np.count_nonzero(mask)))
+    return Variant(transform, frozen(mask), -SUB * corner_xy[0], -SUB * corner_xy[1], int(np.count_nonzero(mask)))
 
 
 def _polygons_of(polygons: Mapping[int, tuple[Sprite, Transform]]) -> dict[int, Variant]:
@@ -515,12 +515,13 @@ def _turned_points(polygons: Sequence[tuple[Sprite, Transform]]) -> Ints:
     sprites = {sprite.uid: sprite for sprite, _ in polygons}
     of_sprite = {uid: np.concatenate(_rings_of(sprite)) for uid, sprite in sprites.items()}
     points = np.stack([of_sprite[sprite.uid] for sprite, _ in polygons])
-    table = np.array([(*form.signs, form.scale_x, form.scale_y, *form.direction) for _, form in polygons])[:, None]
+    rows = [(*transform.signs, transform.scale_x, transform.scale_y, *transform.direction) for _, transform in polygons]
+    table = np.array(rows)[:, None]
     signs, scale, c, s = table[..., :2], table[..., 2:4], table[..., 4], table[..., 5]
     points = turned(rounded_div(points * signs * scale, ONE), c, s)
     sizes = (points.max(axis=1) - points.min(axis=1)) // SUB + 1
-    for (sprite, form), (width, height) in zip(polygons, sizes.tolist(), strict=True):
-        _check_shape(sprite, form, width, height)
+    for (sprite, transform), (width, height) in zip(polygons, sizes.tolist(), strict=True):
+        _check_shape(sprite, transform, width, height)
     return points
 
 
@@ -529,20 +530,20 @@ def _rings_of(sprite: Sprite) -> tuple[Ints, ...]:
     return sprite.outline.rings if sprite.outline else ()
 
 
-def _ellipse_of(sprite: Sprite, radius: int, form: Transform) -> Spans:
+def _ellipse_of(sprite: Sprite, radius: int, transform: Transform) -> Spans:
     """Scale and turn a circle, then fill it."""
-    c, s = form.direction
-    a, b = (int(rounded_div(np.array(radius * v), ONE)) for v in (form.scale_x, form.scale_y))
+    c, s = transform.direction
+    a, b = (int(rounded_div(np.array(radius * v), ONE)) for v in (transform.scale_x, transform.scale_y))
     half = (math.isqrt((a * c) ** 2 + (b * s) ** 2), math.isqrt((a * s) ** 2 + (b * c) ** 2))
-    _check_shape(sprite, form, *(2 * v // (SUB << TRIG_BITS) + 1 for v in half))
+    _check_shape(sprite, transform, *(2 * v // (SUB << TRIG_BITS) + 1 for v in half))
     return ellipse(a, b, c, s)
 
 
-def _check_shape(sprite: Sprite, form: Transform, width: int, height: int) -> None:
+def _check_shape(sprite: Sprite, transform: Transform, width: int, height: int) -> None:
     """Check the size of a shape's mask; the error names what makes it too large, the scale, the shape or the angle."""
     if fits(width, height):
         return
-    if form.scaled:
+    if transform.scaled:
         check_size("scale", width, height)
     outline = sprite.outline or Outline()
     own = (2 * outline.radius // SUB + 1,) * 2 if outline.radius else size_of(outline.rings)

@@ -405,27 +405,28 @@ def moved(volume: Volumes, pivot_256: tuple[int, int], variant: Variant) -> Volu
     PLACE. It and the frame's pivot are relative to the centre of pixel [0, 0] of the frame; the result, a circle or
     polygons, is relative to that of the variant's mask.
     """
-    form = variant.form
+    transform = variant.transform
     parts = volume.parts if isinstance(volume, Parts) else volume
     if isinstance(parts, Circles):
         parts = _on_grid(parts)
     core = parts.core()
     offset = np.array(pivot_256) / SUB
     place = np.array([variant.pivot_x, variant.pivot_y]) / SUB
-    most = max(form.scale_x, form.scale_y) / (1 << SCALE_BITS)
+    most = max(transform.scale_x, transform.scale_y) / (1 << SCALE_BITS)
     reach = float(np.abs(core.points - offset).max() + core.radius.max()) * most
-    grown = 0.0 if form.plain else GROWN_PX + reach * TRIG_ERROR
-    points = _turned(core.points - offset, form) + place
+    grown = 0.0 if transform.plain else GROWN_PX + reach * TRIG_ERROR
+    points = _turned(core.points - offset, transform) + place
     if isinstance(parts, Circles):
         return Circles(_placed(points), core.radius * most + grown)
     rings = Polygons.around(_placed(_grown(replace(core, points=points), grown)), core.starts)
     return Parts(rings, volume.starts) if isinstance(volume, Parts) else rings
 
 
-def _turned(points: Floats, form: Transform) -> Floats:
+def _turned(points: Floats, transform: Transform) -> Floats:
     """Vectors from the pivot, flipped, scaled and turned as the mask is."""
-    x, y = (points / (1 << SCALE_BITS)).T * np.array([[form.scale_x], [form.scale_y]]) * np.array([form.signs]).T
-    c, s = form.direction
+    scale, signs = np.array([[transform.scale_x], [transform.scale_y]]), np.array([transform.signs]).T
+    x, y = (points / (1 << SCALE_BITS)).T * scale * signs
+    c, s = transform.direction
     return np.stack([x * c - y * s, x * s + y * c], axis=1) / (1 << TRIG_BITS)
 
 
@@ -476,8 +477,8 @@ _fitted: LruCache[tuple[Any, ...], Volumes] = LruCache(BOUNDING_CACHE_BYTES, _by
 def _bounding_of(kind: str, sprite: Sprite, variant: Variant) -> Volumes:
     """The volume fitted to a shape's mask, or the moved volume of the frame."""
     if sprite.outline is not None:
-        return _fitted.get((kind, sprite.uid, variant.form), lambda: _on_grid(fitted(kind, variant.mask)))
-    number = variant.form.frame
+        return _fitted.get((kind, sprite.uid, variant.transform), lambda: _on_grid(fitted(kind, variant.mask)))
+    number = variant.transform.frame
     frame = sprite.frames[number]
     volume = _fitted.get((kind, sprite.uid, number), lambda: _on_grid(fitted(kind, frame.mask)))
     return moved(volume, frame_pivot(sprite, frame), variant)

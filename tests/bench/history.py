@@ -53,7 +53,7 @@ CHANGES: dict[str, Callable[[Scene, np.random.Generator], None]] = {
 def deep_copy(scene: Scene) -> object:
     """A copy of all that decides, with masks and sprites."""
     items = scene.items
-    lists = (items.sprites, items.forms, items.angles, items.variants, items.names)
+    lists = (items.sprites, items.transforms, items.angles, items.variants, items.names)
     columns = [getattr(items, name)[: items.count] for name in COLUMNS]
     return copy.deepcopy((columns, lists, items.atlas.flat[: items.atlas.used]))
 

@@ -168,9 +168,9 @@ def _passes(was: Entry, now: Entry) -> list[str] | None:
     for entry, before, after in pairs(was["passes"], now["passes"], "object"):
         name = _name(entry)
         if before is None or after is None:
-            lines.append(f"{'newly' if before is None else 'no longer'} goes through {name}{_way(entry)}")
+            lines.append(f"{'newly' if before is None else 'no longer'} in {name}{_way(entry)}")
         elif _way(before) != _way(after):
-            lines.append(f"goes through {name}{_way(after)}, was{_way(before)}")
+            lines.append(f"in {name}{_way(after)}, was{_way(before)}")
         else:
             lines += [f"in {name}: {line}" for line in first_of(by_path("", before, after))]
     return first_of(lines) or None

@@ -284,10 +284,10 @@ def copied(scene: Scene, ids: Ints, factor: float = 1.0) -> Scene:
     """
     alone, items = Scene(), scene.items
     for row in items.table.rows(ids).tolist():
-        form, place = items.forms[row], scaled(items.position_256[row] / SUB, factor).tolist()
+        transform, place = items.transforms[row], scaled(items.position_256[row] / SUB, factor).tolist()
         alone.add(
-            items.sprites[row], place, angle=items.angles[row], flip=form.flip, frame=form.frame,
-            scale=[v / (1 << SCALE_BITS) * factor for v in (form.scale_x, form.scale_y)],
+            items.sprites[row], place, angle=items.angles[row], flip=transform.flip, frame=transform.frame,
+            scale=[v / (1 << SCALE_BITS) * factor for v in (transform.scale_x, transform.scale_y)],
             layer=int(items.layer[row]), name=items.names[row],
             velocity_xy=(items.velocity_256[row] / SUB * factor).tolist(),
         )  # fmt: skip

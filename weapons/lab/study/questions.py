@@ -114,15 +114,15 @@ def _truth(discs: Discs) -> Decisions:
 def _shape(scene: Scene, item: int) -> truth.Round | truth.Straight | None:
     """Return the exact shape of an object in the world, which is known of polygons and circles, but not of ellipses."""
     row = scene.items.table.row(item)
-    form, outline = scene.items.forms[row], scene.items.sprites[row].outline
-    if outline is None or (outline.radius is not None and form.scale_x != form.scale_y):
+    transform, outline = scene.items.transforms[row], scene.items.sprites[row].outline
+    if outline is None or (outline.radius is not None and transform.scale_x != transform.scale_y):
         return None
     position = scene.items.position_256[row] / SUB
-    scale = form.scale_x / (1 << SCALE_BITS), form.scale_y / (1 << SCALE_BITS)
+    scale = transform.scale_x / (1 << SCALE_BITS), transform.scale_y / (1 << SCALE_BITS)
     if outline.radius is not None:
         return truth.Round(position, outline.radius / SUB * scale[0])
     rings = [ring / SUB for ring in outline.rings]
-    return truth.Straight(truth.placed_rings(rings, form.flip, scale, scene.items.angles[row], position))
+    return truth.Straight(truth.placed_rings(rings, transform.flip, scale, scene.items.angles[row], position))
 
 
 SCALES = (1 / 8, 1 / 4, 1 / 2, 1, 2, 4)
@@ -252,7 +252,7 @@ def _unturned(scene: Scene) -> Iterator[tuple[Bools, Floats, Floats]]:
     """Yield the masks of objects before rotation, their pivots in the masks, and the positions of the masks, px."""
     items = scene.items
     for row in items.rows.tolist():
-        variant = variant_of(items.sprites[row], items.forms[row]._replace(quarter=0, c=1 << TRIG_BITS, s=0))
+        variant = variant_of(items.sprites[row], items.transforms[row]._replace(quarter=0, c=1 << TRIG_BITS, s=0))
         pivot = np.array([variant.pivot_x, variant.pivot_y]) / SUB
         yield variant.mask, pivot, items.position_256[row] / SUB - pivot
 
