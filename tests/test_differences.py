@@ -311,9 +311,7 @@ def test_words_about_rays() -> None:
     ducks = [told(scene, Pistol(90), (200, 180), aim=0) for scene in (near, moved)]
     here = "shot 0 (pistol at 200, 180): ray: "
     assert f"{here}stopped at duck, 39.5 px (hits), was 37.5 px" in differences(*ducks)
-    assert f'{here}in object 0 "duck" from 39.5 px to 39.5 px, was from 37.5 px to 37.5 px' in differences(
-        *ducks
-    )
+    assert f'{here}in object 0 "duck" from 39.5 px to 39.5 px, was from 37.5 px to 37.5 px' in differences(*ducks)
     fans = [told(scene, Spread(Pistol(90), count=3, radius=9), (200, 180), aim=0, seed=2) for scene in (near, moved)]
     assert any("): ray 2: stopped at duck, " in line for line in differences(*fans))
     bursts = [told(scene, Rounds(Pistol(90), count=2), (200, 180), aim=0) for scene in (near, moved)]

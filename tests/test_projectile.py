@@ -235,6 +235,18 @@ def test_a_disc_that_does_not_fly_meets_what_is_there_or_comes(velocity: Vector)
     assert hits.passes.entry[-1] == 0
 
 
+@pytest.mark.parametrize("role", ["hittable", "occluder"])
+def test_a_pixel_that_comes_from_above_is_entered_from_below(role: str) -> None:
+    """A pixel alone has no slope. Seen from it the disc flies up, though it flies to the right and hardly up."""
+    scene = Scene()
+    scene.add(ONE, (500, 500), role=role)
+    scene.add(ONE, (4, -40), role=role, velocity_xy=(0, 76))
+    hits = fire(scene, Projectile(8, 1), [(0, 0), (499, 500)], aim=[-1, 0])
+    assert hits.stop.item.tolist() == [1, 0]
+    assert hits.stop.normal_xy.tolist() == [[0, 1], [-1, 0]]
+    assert hits.passes.normal_xy.tolist() == ([[0, 1], [-1, 0]] if role == "hittable" else [])
+
+
 @pytest.mark.parametrize("velocity", [(0, 0), (0, 256)])
 def test_things_met_at_one_time_are_taken_in_order(velocity: Vector) -> None:
     """A disc of radius 2 flies down x = 0 between pixels at (-2, 9) and (2, 9)."""

@@ -25,11 +25,11 @@ from .. import late
 from ..fire.hits import HitRow
 from ..fire.prefilter import filters_of
 from ..kinds.areas import ray_parts_of
-from ..kinds.placements import STRAIGHT
+from ..kinds.placements import STRAIGHT, ZEROS
 from ..kinds.rays import RayWeapon, unspent
 from ..kinds.weapon import Weapon
 from ..rays import raycast
-from ..rays.contacts import NEVER, Rays, Touches, endless, rays_of
+from ..rays.contacts import NEVER, Rays, Touches, endless
 from ..rays.one_ray import Follow, Followed, chosen_follower
 from ..rays.ray_hits import Later, RayHits, Walk, weights_at
 from ..rays.ray_walk import lines_of
@@ -39,14 +39,25 @@ from .prepare import PLAIN, Ready, plain_number, plain_pair
 
 Pair = tuple[float, float]
 
+Line = tuple[tuple[int, int], tuple[int, int]]
+"""Start of a ray, and the vector from there to its end, 1/256 px."""
+
 ENTRY = 4
 """Place in a row of `Followed` of the time at which the ray enters the object."""
+
+
+def ray_along(start: tuple[int, int], step: tuple[int, int]) -> Rays:
+    """The ray of the first shot along a line, 1/256 px."""
+    start_256, zero = np.array([start]), ZEROS[:1]
+    return Rays(start_256, np.array([step]), pixel(start_256), shot=zero, round=zero, pellet=zero)
 
 
 class OneRay(OneShot, RayHits):
     """Answer of one prepared ray: a list of its rows; all else is made when it is asked for."""
 
-    __slots__ = ("_arguments",)  # set at each shot
+    __slots__ = ("_arguments", "_line")  # set at each shot
+
+    _line: Line
 
     @cached_attribute
     def _weighted(self) -> bool:
@@ -58,9 +69,9 @@ class OneRay(OneShot, RayHits):
         """The ray as a batch of one, followed anew in the snapshot of the scene."""
         parts, stack, bounds = ray_parts_of(self.weapon), self._present.stack, self._present.bounds
         assert parts is not None  # it was prepared as one
-        rays, ray = rays_of(parts, self.shots), parts[2]
+        rays, ray = ray_along(*self._line), parts[2]
         lines = Lines(rays.start_256, rays.step_256, ray.radius_256)
-        filters = filters_of(stack, self.shots, rays.shot)
+        filters = filters_of(stack, self._present.filter.shot_at_origin(None, 0), rays.shot)
         cast = stack, bounds, lines, ray.hits_most, filters
         found = kernels_of(raycast).hits_and_ends(*cast) or raycast.hits_and_ends(*cast)
         walk = raycast.walk_of(rays, ray, stack, bounds, found)
@@ -111,6 +122,7 @@ class ReadyRay(Ready[RayHits]):
             return Ready.fire(self, at, aim, toward, shot)
         hits: OneRay = OneRay()
         hits._present, hits._at, hits._arguments = self._present, place, (angle, target, number)
+        hits._line = start, step
         found = followed[1]
         if self._budget_256 and found:
             found = self._before_spent(start, step, self._budget_256, followed)
@@ -130,10 +142,9 @@ class ReadyRay(Ready[RayHits]):
         self, start: tuple[int, int], step: tuple[int, int], budget_256: int, followed: Followed
     ) -> list[list[int]]:
         """What a ray hits before its budget is used up, of what it hits without one."""
-        cost, only, start_256, ends = self._present.cost, np.zeros(1, np.int64), np.array([start]), endless(1)
+        cost, ends, rays = self._present.cost, endless(1), ray_along(start, step)
         assert cost is not None  # its weapon has a budget
         ends.time[0] = followed[0]
-        rays = Rays(start_256, np.array([step]), pixel(start_256), shot=only, round=only, pellet=only)
         (left, top), (rank, count, x, y, entry) = rays.origin_xy[0].tolist(), np.array(followed[1]).T
         hit = Touches(np.zeros_like(rank), rank, count, x - left, y - top, entry)
         walk = Walk(rays, lines_of(rays, self._ray), hit, ends, self._stack, self._present.bounds, None)

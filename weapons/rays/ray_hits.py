@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
@@ -170,7 +170,10 @@ class Walk:
         scale, length = self.lines.scale[ray], self.lines.length[ray]
         first = hit.entry / scale
         last = np.maximum(np.minimum(walked.leave[out] / scale, ends.fraction[ray]), first)
-        sides = relative.entered_by(chosen, hit.x, hit.y)
+
+        def sides(rows: Ints) -> Ints:
+            return relative.entered_by(chosen[rows], hit.x[rows], hit.y[rows])
+
         return Passes(
             of.shot, of.round, of.pellet, of.object, of.order, of.entry_xy,
             np.stack([walked.x[out], walked.y[out]], axis=1) + self.rays.origin_xy[ray],
@@ -183,11 +186,34 @@ class Walk:
     @cached_property
     def stops(self) -> Stops:
         """Stops of the rays."""
-        if self.traced:
-            met, lines = self.traced
-            return stops_of(met.ray, met.rank, self.ends, self.rays, self.lines, lines, self.stack)
-        ray = np.flatnonzero(self.ends.rank >= 0)
-        return stops_of(ray, self.ends.rank[ray], self.ends, self.rays, self.lines, self.lines.take(ray), self.stack)
+        rays, ends = self.rays, self.ends
+        ends_at_once = (ends.reason == Reason.BUDGET) & (ends.rank < 0)
+        cell_xy = pixel(rays.start_256 + rays.step_256 * ~ends_at_once[:, None])
+        item, normal = np.full(len(rays), -1), np.zeros((len(rays), 2), np.int64)
+        stopped = np.flatnonzero(ends.rank >= 0)
+        cell_xy[stopped] = np.stack([ends.x, ends.y], axis=1)[stopped] + rays.origin_xy[stopped]
+        item[stopped] = self.stack.ids[ends.rank[stopped]]
+        hard = stopped[ends.reason[stopped] != Reason.BUDGET]
+
+        def sides(rows: Ints) -> Ints:
+            ray = hard[rows]
+            lines, line = self._relative(ray, ends.rank[ray])
+            return lines.entered_by(line, ends.x[ray], ends.y[ray])
+
+        normal[hard] = normals_at(self.stack, ends.rank[hard], cell_xy[hard], sides)
+        return Stops(
+            rays.shot, rays.round, rays.pellet, ends.reason, item, cell_xy, ends.fraction,
+            ends.fraction * self.lines.length, points_at(rays, np.arange(len(rays)), ends.fraction), normal,
+        )  # fmt: skip
+
+    def _relative(self, ray: Ints, rank: Ints) -> tuple[Lines, Ints]:
+        """Lines, and which of them (n,) are those of rays relative to the motion of the items in which they end."""
+        if not self.traced:
+            return self.lines, ray
+        met, lines = self.traced
+        key = met.ray * len(self.stack) + met.rank
+        order = np.argsort(key)
+        return lines, order[np.searchsorted(key[order], ray * len(self.stack) + rank)]
 
     def parts(self) -> list[Walk]:
         """The same rays in parts of about CHUNK_CELLS cells of objects, which can be found again."""
@@ -223,35 +249,6 @@ def walked_of(met: Contacts, ends: Terminations, stack: Stack) -> tuple[Contacts
     return walked.take(order), chosen[order]
 
 
-def stops_of(
-    ray: Ints, rank: Ints, ends: Terminations, rays: Rays, lines: Lines, relative: Lines, stack: Stack
-) -> Stops:
-    """Stops of rays.
-
-    Parameters
-    ----------
-    ray, rank, relative : pairs of a ray and an item that it touches, with those in which rays end, and the line of
-        each, relative to the item's motion
-    """
-    ends_at_once = (ends.reason == Reason.BUDGET) & (ends.rank < 0)
-    cell_xy = pixel(rays.start_256 + rays.step_256 * ~ends_at_once[:, None])
-    item, normal = np.full(len(rays), -1), np.zeros((len(rays), 2), np.int64)
-    stopped = np.flatnonzero(ends.rank >= 0)
-    here = np.stack([ends.x, ends.y], axis=1)[stopped]
-    cell_xy[stopped] = here + rays.origin_xy[stopped]
-    item[stopped] = stack.ids[ends.rank[stopped]]
-    hard = np.flatnonzero(ends.reason[stopped] != Reason.BUDGET)
-    row, (x, y) = stopped[hard], here[hard].T
-    key = ray * max(len(stack), 1) + rank
-    order = np.argsort(key)
-    pair = order[np.searchsorted(key[order], row * max(len(stack), 1) + ends.rank[row])] if len(row) else row
-    normal[row] = normals_at(stack, ends.rank[row], cell_xy[row], relative.entered_by(pair, x, y))
-    return Stops(
-        rays.shot, rays.round, rays.pellet, ends.reason, item, cell_xy, ends.fraction, ends.fraction * lines.length,
-        points_at(rays, np.arange(len(rays)), ends.fraction), normal,
-    )  # fmt: skip
-
-
 def points_at(rays: Rays, ray: Ints, part: Floats) -> Floats:
     """Points of rays at fractions of their lengths, px."""
     return np.asarray(rays.start_256[ray] / SUB + part[:, None] * (rays.step_256[ray] / SUB))
@@ -276,16 +273,21 @@ def _material(walked: Contacts, ends: Terminations, lines: Lines) -> Floats:
     return total
 
 
-def normals_at(stack: Stack, rank: Ints, xy: Ints, sides: Ints) -> Ints:
-    """Outward normals of items at their pixels (n, 2): gradients of the masks, or the given `sides` if these are 0."""
-    box = stack.box_xyxy[rank]
-    near = xy[:, None] + GRADIENT_XY
-    inside = ((near >= box[:, None, :2]) & (near <= box[:, None, 2:])).all(axis=2)
-    row, column = near[..., 1] - box[:, None, 1], near[..., 0] - box[:, None, 0]
-    texel = np.where(inside, stack.offset[rank][:, None] + row * stack.width[rank][:, None] + column, 0)
-    on = inside & stack.masks[texel]
-    normal = np.stack([np.where(on, GRADIENT[:, axis], 0).sum(axis=1) for axis in (0, 1)], axis=1)
-    return np.where((normal == 0).all(axis=1, keepdims=True), sides, normal)
+def normals_at(stack: Stack, rank: Ints, xy: Ints, sides: Callable[[Ints], Ints]) -> Ints:
+    """Outward normals of items at their pixels (n, 2): gradients of the masks.
+
+    Where the gradient is 0, it is the normal of the side by which a ray enters the pixel; `sides` tells it of rows.
+    """
+    left, top, right, low = (side[:, None] for side in stack.box_xyxy[rank].T)
+    x, y = (at[:, None] + near for at, near in zip(xy.T, GRADIENT_XY.T, strict=True))
+    inside = (x >= left) & (x <= right) & (y >= top) & (y <= low)
+    texel = stack.offset[rank][:, None] + (y - top) * (right - left + 1) + x - left
+    on = inside & stack.masks[np.where(inside, texel, 0)]
+    normal: Ints = on.astype(np.int64) @ GRADIENT
+    flat = np.flatnonzero(~normal.any(axis=1))
+    if len(flat):
+        normal[flat] = sides(flat)
+    return normal
 
 
 def weights_at(entry: Ints, scale: Ints, falloff: str | None) -> Ints:
@@ -467,8 +469,8 @@ class RayHits(Hits):
 
 
 def _unwritable(columns: C) -> C:
-    for f in fields(columns):
-        getattr(columns, f.name).flags.writeable = False
+    for column in vars(columns).values():
+        column.flags.writeable = False
     return columns
 
 
