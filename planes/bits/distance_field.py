@@ -55,7 +55,7 @@ LOOKS_MOST = 512
 FEW = 50
 """Number of rays left at which they are followed one by one, in Python integers."""
 
-ONE_BY_ONE = 4
+ONE_BY_ONE = 16
 """Most rays of a call that are followed one by one from the start."""
 
 Clearance = npt.NDArray[np.uint8]
