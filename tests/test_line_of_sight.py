@@ -6,6 +6,7 @@ import itertools
 import json
 import random
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +46,7 @@ from hitplanes import (
     weapons_of,
 )
 from hitplanes.planes.bits import shadows
+from hitplanes.planes.common.backend import kernels_of
 from hitplanes.planes.grid.spans import rectangles
 from hitplanes.weapons.cli.command import main
 from hitplanes.weapons.fire.shelter import ways_box
@@ -242,6 +244,22 @@ def test_a_start_in_an_occluder() -> None:
     assert fire(scene, Disc(1, line_of_sight="all", inside="error"), (3, 0), exclude=box).verdict_counts()["hit"] == 0
 
 
+@pytest.mark.usefixtures("jit")
+@pytest.mark.parametrize("strategy", WAYS)
+def test_shots_that_begin_in_walls_of_few_and_of_many_rectangles(strategy: str) -> None:
+    """Together they hit what each hits alone."""
+    comb, broken = np.zeros((2, 10), np.bool_), np.array([[1, 1, 0, 0, 1]], np.bool_)
+    comb[0], comb[1, 2::2] = True, True
+    scene = Scene()
+    for wall, x in ((comb, -1000), (broken, 0)):
+        scene.add(Sprite.from_mask(wall, pivot_xy=(0, 0)), (x, 0), role="occluder")
+        scene.add(Sprite.from_mask(np.ones((3, 9), np.bool_), pivot_xy=(0, 0)), (x + 2, 0))
+    weapon = Disc(9, line_of_sight="occluders", inside="ignore_until_exit")
+    hits = fire(scene, weapon, [(-1000, 0), (1, 0)], strategy=strategy)
+    alone = [fire(scene, weapon, at, strategy="spans")[0] for at in ((-1000, 0), (1, 0))]
+    assert [row.pixels for row in hits] == [row.pixels for row in alone]
+
+
 def test_inside_needs_a_line_of_sight_and_words_are_checked() -> None:
     with pytest.raises(InputError, match="inside: expected 'hit' of a weapon without line_of_sight, got 'error'"):
         Disc(3, inside="error")
@@ -407,6 +425,48 @@ def test_rectangles_cover_a_mask_and_nothing_else(height: int, width: int, data:
         assert mask[y : y_max + 1, x : x_max + 1].all()
         covered[y : y_max + 1, x : x_max + 1] = True
     assert (covered == mask).all()
+
+
+def has_a_gap(squares: list[tuple[int, int]], x: int, y: int) -> bool:
+    """Whether the way from (0, 0) to (x, y) leaves closed squares, of which one holds (0, 0), and meets them again."""
+    reached = Fraction(0)
+    for first, last in sorted(part for part in (inside(square, x, y) for square in squares) if part):
+        if first > reached:
+            return True
+        reached = max(reached, last)
+    return False
+
+
+def inside(square: tuple[int, int], x: int, y: int) -> tuple[Fraction, Fraction] | None:
+    """The part of the way from (0, 0) to (x, y) that lies in the closed square around a point."""
+    first, last = Fraction(0), Fraction(1)
+    for at, step in zip(square, (x, y), strict=True):
+        if step:
+            sides = [Fraction(2 * at + side, 2 * step) for side in (-1, 1)]
+            first, last = max(first, min(sides)), min(last, max(sides))
+        elif at:
+            return None
+    return (first, last) if first <= last else None
+
+
+@pytest.mark.usefixtures("jit")
+def test_what_a_way_leaves_and_meets_again() -> None:
+    """Items of any shape, which the ways begin in, against the squares of their pixels one by one."""
+    rng, items, seen = np.random.default_rng(5), [], []
+    for k in range(40):
+        mask = rng.random(rng.integers(1, 9, 2)) < rng.uniform(0.2, 1)
+        mask[tuple(rng.integers(mask.shape))] = True
+        y, x = (int(v) for v in rng.permutation(np.argwhere(mask))[0])
+        items.append(rectangles(mask) - np.array([x, y, x, y]))
+        squares = [(int(right) - x, int(down) - y) for down, right in np.argwhere(mask)]
+        ways = rng.integers(-9, 10, (40, 2)).tolist()
+        seen += [(k, right, down, has_a_gap(squares, right, down)) for right, down in ways]
+    most = max(map(len, items))
+    rects = np.array([[*item, *[shadows.NO_RECT[0]] * (most - len(item))] for item in items])
+    item, x, y, gap = np.array(seen).T
+    found = kernels_of(shadows).left_and_met(rects, item, x, y)
+    assert found.tolist() == np.flatnonzero(gap).tolist()
+    assert 200 < len(found) < 1400 and (x == 0).any() and (y == 0).any()
 
 
 @pytest.mark.usefixtures("jit")

@@ -18,6 +18,7 @@ Ericson, *Real-Time Collision Detection* (2005), 5.3.3 (segment against box).
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from functools import partial
 from itertools import product
@@ -48,6 +49,8 @@ BLOCK = 128
 ONE_BLOCK = 0, 0, 1, 1
 
 FULL, NO_RECTS = np.uint64(2**64 - 1), np.zeros((0, 4), np.int64)
+NO_RECT = np.array([[1, 1, -1, -1]])
+"""A rectangle without a pixel, which no way meets."""
 
 
 class Blockers(NamedTuple):
@@ -209,12 +212,10 @@ def hide_behind(rows: Words, corner_xy: Ints, origin_xy: Ints, blockers: Blocker
     origin_xy : (n, 2) pixels from which the ways begin
     pair, blocker : (k,) sorted pairs of a row of `rows` and a blocker
     """
+    if blockers.until_exit:
+        pair, blocker = hide_after_exit(rows, corner_xy, origin_xy, blockers, pair, blocker)
     height, corner = rows.shape[1], corner_xy - origin_xy
     place, rects = blockers.rects_of(blocker, origin_xy[pair])
-    if blockers.until_exit:
-        place, rects, begun = _begun_apart(place, rects)
-        for k, inside in begun:
-            _clear_after_exit(rows[pair[k]], corner[pair[k]], inside)
     own = pair[place]
     kept = _between(rects, (sides_of(rows) + np.tile(corner, 2))[own]).nonzero()[0]
     own, rects, (left, top) = own[kept], rects[kept], corner[own[kept]].T
@@ -228,6 +229,67 @@ def hide_behind(rows: Words, corner_xy: Ints, origin_xy: Ints, blockers: Blocker
         hidden[rect, row] = _columns(first, last, columns) & ~_columns(bare_first, bare_last, columns)
         new = begins(own[now]).nonzero()[0]
         rows[own[now][new]] &= ~np.bitwise_or.reduceat(hidden, new, axis=0)
+
+
+def hide_after_exit(
+    rows: Words, corner_xy: Ints, origin_xy: Ints, blockers: Blockers, pair: Ints, blocker: Ints
+) -> tuple[Ints, Ints]:
+    """Clear the pixels that blockers shelter once the ways that begin in them have left them.
+
+    Parameters are those of `hide_behind`. Returned are the other pairs, of ways that begin elsewhere.
+    """
+    origin, box = origin_xy[pair], blockers.box_xyxy[blocker]
+    near = np.flatnonzero(((box[:, :2] <= origin) & (origin <= box[:, 2:])).all(axis=1))
+    place, rects = blockers.rects_of(blocker[near], origin[near])
+    begun = sorted_once(place[_holds_origin(rects)])
+    own, first = pair[near[begun]], place.searchsorted(begun)
+    last = place.searchsorted(begun, side="right") - 1
+    most = int((last - first).max(initial=0)) + 1
+    for part in pieces(most * np.bitwise_count(rows[own]).sum(axis=1, dtype=np.int64), CHUNK_SAMPLES):
+        row, number = own[part], first[part, None] + np.arange(most)
+        k, bit, column = _pixels_of(rows[row])
+        x, y = np.stack([column, bit]) + (corner_xy - origin_xy)[row[k]].T
+        of_pair = np.append(rects, NO_RECT, axis=0)[np.where(number <= last[part, None], number, -1)]
+        again = kernels_of(sys.modules[__name__]).left_and_met(of_pair, k, x, y)
+        k, bit, column = k[again], bit[again], column[again]
+        of_pair = rects[np.minimum(number, last[part, None])]  # some are there twice
+        hidden = _times(of_pair[k].swapaxes(0, 1), x[again], y[again], True)[0].any(axis=0)
+        np.bitwise_and.at(rows, (row[k[hidden]], bit[hidden]), ~(np.uint64(1) << column[hidden].astype(np.uint64)))
+    apart = np.ones(len(pair), np.bool_)
+    apart[near[begun]] = False
+    return pair[apart], blocker[apart]
+
+
+def left_and_met(rects: Ints, k: Ints, x: Ints, y: Ints) -> Ints:
+    """Pixels (s,) on the way to which from pixel (0, 0) an item is left and met again.
+
+    The rectangles of an item share no pixel. So a way that has not left it is as long as its parts in them together.
+
+    Parameters
+    ----------
+    rects : (B, m, 4) of each item, of which one holds pixel (0, 0)
+    k : (s,) item of each pixel
+    """
+    across, down = np.maximum(np.abs(x), 1), np.maximum(np.abs(y), 1)
+    low, high = 2 * np.moveaxis(rects, 2, 0)[:2] - 1, 2 * np.moveaxis(rects, 2, 0)[2:] + 1  # in halves of a pixel
+    end = 2 * across * down
+    entry, leave = 0, end[:, None]
+    for axis, (step, scale) in enumerate(((x, down), (y, across))):
+        factor = (np.sign(step) * scale)[:, None]
+        near, far = low[axis].take(k, axis=0) * factor, high[axis].take(k, axis=0) * factor
+        back, level = step < 0, step == 0
+        near[back], far[back] = far[back], near[back]
+        far[level] = np.where((low[axis][k[level]] <= 0) & (high[axis][k[level]] >= 0), end[level, None], -1)
+        entry, leave = np.maximum(near, entry), np.minimum(far, leave)
+    inside = np.maximum(leave - entry, 0).sum(axis=1)
+    return np.flatnonzero(inside < np.where(entry <= leave, leave, 0).max(axis=1))
+
+
+def _pixels_of(rows: Words) -> tuple[Ints, Ints, Ints]:
+    """Set bits of words (n, height), as (number, row, column)."""
+    octets = np.ascontiguousarray(rows, "<u8").view(np.uint8)
+    number, row, column = np.unpackbits(octets, axis=1, bitorder="little").reshape(*rows.shape, WORD).nonzero()
+    return number, row, column
 
 
 def _between(rects: Ints, boxes_xyxy: Ints) -> Bools:
@@ -352,39 +414,33 @@ def _holds_origin(rects: Ints) -> Bools:
     return np.asarray(((rects[:, :2] <= 0) & (rects[:, 2:] >= 0)).all(axis=1))
 
 
-def _clear_after_exit(row: Words, corner_xy: Ints, rects: Ints) -> None:
-    """Clear the pixels of words (height,) that a blocker shelters once the way has left it."""
-    y, x = np.nonzero(np.unpackbits(row.astype("<u8").view(np.uint8), bitorder="little").reshape(len(row), WORD))
-    hidden = _times(rects, x + corner_xy[0], y + corner_xy[1], True)[0].any(axis=0)
-    np.bitwise_and.at(row, y[hidden], ~(np.uint64(1) << x[hidden].astype(np.uint64)))
-
-
 def _hidden_after_exit(runs: Runs, placement: int, pair: int, x: int, y: int, rects: Ints) -> tuple[Ints, ...]:
     """Pixels of runs of a placement that a blocker shelters once the way has left it: (pair, run, x_first, x_last)."""
     own = (runs.placement == placement).nonzero()[0]
     run, column = each_pixel(runs.x_first[own], runs.x_last[own])
-    hidden = _times(rects, column - x, runs.y[own][run] - y, True)[0].any(axis=0)
+    hidden = _times(rects[:, None], column - x, runs.y[own][run] - y, True)[0].any(axis=0)
     return np.full(int(hidden.sum()), pair), own[run[hidden]], column[hidden], column[hidden]
 
 
 def _times(rects: Ints, x: Ints, y: Ints, until_exit: bool) -> tuple[Bools, Ints]:
-    """Which rectangles (m, 4) of an item lie on the way from pixel (0, 0) to pixels (s,), and when the way enters them.
+    """Which rectangles of an item lie on the way from pixel (0, 0) to pixels (s,), and when the way enters them.
 
     Parameters
     ----------
+    rects : (m, s, 4), or (m, 1, 4) of the same item for all pixels
     until_exit : whether what the way enters before it has left the item for the first time does not count
 
     Returns
     -------
     hidden, entry : (m, s); times in units of 1 / (2 max(1, abs(x)) max(1, abs(y))) of the segment
     """
-    first, last, bare_first, bare_last = shadow(rects[:, None], y)
+    first, last, bare_first, bare_last = shadow(rects, y)
     met = (first <= x) & (x <= last)
     hidden = met & ~((bare_first <= x) & (x <= bare_last))
     across, down = np.maximum(np.abs(x), 1), np.maximum(np.abs(y), 1)
     entry, leave = np.zeros_like(met, np.int64), np.broadcast_to(2 * across * down, met.shape)
     for axis, (step, scale) in enumerate(((x, down), (y, across))):
-        low, high = 2 * rects[:, axis, None] - 1, 2 * rects[:, axis + 2, None] + 1
+        low, high = 2 * rects[..., axis] - 1, 2 * rects[..., axis + 2] + 1
         near, far = np.where(step > 0, low, -high) * scale, np.where(step > 0, high, -low) * scale
         entry = np.where(step == 0, entry, np.maximum(entry, near))
         leave = np.where(step == 0, leave, np.minimum(leave, far))
@@ -420,7 +476,7 @@ def sheltered_by(
         these = these[own[these] != rank]
         rects = blockers.rects_of(np.array([b]), origin_xy[p][None])[1]
         x, y = (xy[these] - origin_xy[p]).T
-        hidden, entry = _times(rects, x, y, blockers.until_exit and bool(_holds_origin(rects).any()))
+        hidden, entry = _times(rects[:, None], x, y, blockers.until_exit and bool(_holds_origin(rects).any()))
         time = np.where(hidden, entry, NEVER).min(axis=0, initial=NEVER)
         sooner = time < soonest[these]
         soonest[these[sooner]], blocker_rank[these[sooner]] = time[sooner], rank

@@ -240,12 +240,41 @@ def _hide_behind(rows, corner, origin, box, begin, rects, bounds, pair, blocker)
                     rows[own, row] &= ~_shadow(x_min, y_min, x_max, y_max, top + row, left)
 
 
+@compiled(types.int64(types.Array(types.int64, 3, "C", readonly=True), INTS, INTS, INTS, OUT))
+def _left_and_met(rects, item, x, y, again):
+    count = 0
+    for i in range(len(x)):
+        across, down = max(abs(x[i]), 1), max(abs(y[i]), 1)
+        inside, last, own = 0, 0, rects[item[i]]
+        for r in range(len(own)):
+            entry, leave = 0, 2 * across * down
+            for axis, step, scale in ((0, x[i], down), (1, y[i], across)):
+                low, high = 2 * own[r, axis] - 1, 2 * own[r, axis + 2] + 1
+                if step > 0:
+                    entry, leave = max(entry, low * scale), min(leave, high * scale)
+                elif step < 0:
+                    entry, leave = max(entry, -high * scale), min(leave, -low * scale)
+                elif low > 0 or high < 0:
+                    leave = -1
+            if entry <= leave:
+                inside, last = inside + leave - entry, max(last, leave)
+        again[count] = i
+        count += inside < last
+    return count
+
+
+def left_and_met(rects: Ints, k: Ints, x: Ints, y: Ints) -> Ints:
+    """See `bits.shadows.left_and_met`."""
+    again = np.empty(len(x), np.int64)
+    return again[: _left_and_met(rects, k, x, y, again)]
+
+
 def hide_behind(
     rows: Words, corner_xy: Ints, origin_xy: Ints, blockers: shadows.Blockers, pair: Ints, blocker: Ints
 ) -> None:
     """See `bits.shadows.hide_behind`."""
     if blockers.until_exit:
-        return shadows.hide_behind(rows, corner_xy, origin_xy, blockers, pair, blocker)
+        pair, blocker = shadows.hide_after_exit(rows, corner_xy, origin_xy, blockers, pair, blocker)
     bounds = EVERYWHERE if blockers.bounds is None else blockers.bounds
     boxes = np.ascontiguousarray(blockers.box_xyxy)
     _hide_behind(rows, corner_xy, origin_xy, boxes, blockers.begin, blockers.rects, bounds, pair, blocker)
