@@ -345,14 +345,20 @@ def why_not(battle: Battle, scene: Scene, which: int, hit: set[int]) -> list[tup
     for item in items_of(scene):
         if item.occluder or item.id in hit or not item.pixels or not len(samples):
             continue
-        pixels = np.array(sorted(item.pixels))
+        x, y, x_max, y_max = scene.bounds or (-math.inf, -math.inf, math.inf, math.inf)
+        reached = sorted(at for at in item.pixels if x <= at[0] <= x_max and y <= at[1] <= y_max)
+        pixels = np.array(reached or sorted(item.pixels))
         distance2 = int(((samples[:, None] - pixels[None]) ** 2).sum(axis=-1).min())
+        if not {*map(tuple, samples.tolist())}.isdisjoint(item.pixels):
+            distance2 = 0
         if distance2 > 32**2:
             continue
         on = [walk for walk, xy in zip(walks, samples.tolist(), strict=True) if tuple(xy) in item.pixels]
         ended = Counter(walk.ended_by.id for walk in on if walk.ended_by is not None)
         if oracle_stack.refused(item, shot.accept, shot.blocked_by, shot.exclude):
             reason = "excluded" if item.categories & shot.accept else "category"
+        elif not reached:
+            reason = "outside"
         elif not on:
             reason = "missed"
         else:

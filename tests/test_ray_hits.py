@@ -32,6 +32,7 @@ from hitplanes import (
     Rounds,
     Scene,
     Spread,
+    Sprite,
     Sweep,
     Verdict,
     Weapon,
@@ -498,6 +499,22 @@ def test_what_lies_partly_out_of_bounds() -> None:
     assert [fire(edge, Laser(9), at, aim=90).why_not()[0][:2] for at in ((25, 10), (21, 5))] == [
         (half, "missed"), (half, "outside"),
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize("weapon", [Disc(2), Pistol(20), Laser(20, width=3)], ids=repr)
+def test_only_what_lies_within_the_bounds_can_be_missed(weapon: Weapon) -> None:
+    """A bracket of which one arm lies out of bounds, just above the shot; and a board that lies out of them."""
+    scene, bracket = Scene((100, 100)), np.zeros((40, 60), np.bool_)
+    bracket[:8] = bracket[:, :5] = True
+    arm = scene.add(Sprite.from_mask(bracket, pivot_xy=(0, 0)), (30, -10))
+    board = scene.add(Sprite.from_mask(np.ones((2, 9), np.bool_), pivot_xy=(0, 0)), (56, -14))
+    hits = fire(scene, weapon, (60, 3), aim=0)
+    near, far = hits.why_not()
+    assert near[:2] == (board, "outside") and far[:2] == (arm, "missed")
+    assert 23 < far.distance < 26 and 10 < near.distance < 16
+    if isinstance(hits, RayHits):
+        miss = hits.nearest_miss()
+        assert miss is not None and (miss.object, miss.distance) == (arm, far.distance)
 
 
 def test_why_not_looks_32_px_around_and_tells_the_nearest_first() -> None:

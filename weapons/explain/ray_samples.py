@@ -24,7 +24,7 @@ from ..fire.prefilter import Candidates, refused
 from ..kinds.placements import Shots
 from ..rays.contacts import Contacts, Parts, Rays, Reason, Terminations, cells_hit, rays_of, steps_of
 from ..rays.ray_walk import Range, touching, trace
-from .samples import Behind, Blocked, Samples, WhyNot, unmet
+from .samples import Behind, Blocked, Samples, WhyNot, pixels_in, unmet
 
 REACH_BITS = 23  # of a coordinate of a cell: cells lie within 2**22 px of their ray's origin; x, y and ray fit int64
 
@@ -262,17 +262,21 @@ def ray_why_not(detail: RayDetail, hit: Set[int]) -> list[WhyNot]:
     stack, met = detail.stack, detail.every
     objects = [r for r in np.flatnonzero(~stack.occluder).tolist() if int(stack.ids[r]) not in hit]
     touched = np.bincount(met.rank, met.count, len(stack)).astype(np.int64)
-    beside = [rank for rank in objects if not touched[rank]]
-    near = {rank: gap[0] for rank, gap in _gaps(detail, beside, None, NEAR_PX).items()}
+    box, bounds = stack.box_xyxy, detail.bounds
+    cut = np.zeros(len(stack), np.bool_) if bounds is None else (clipped(box, bounds) != box).any(axis=1)
+    outside = {rank for rank in objects if cut[rank] and not len(pixels_in(stack, rank, bounds))}
+    beside = [rank for rank in objects if not touched[rank] and rank not in outside]
+    near = {rank: gap[0] for rank, gap in _gaps(detail, beside, bounds, NEAR_PX).items()}
+    near |= {rank: gap[0] for rank, gap in _gaps(detail, sorted(outside), None, NEAR_PX).items()}
     near |= {rank: 0.0 for rank in objects if touched[rank]}
-    found = [_why(detail, rank, int(touched[rank]), distance) for rank, distance in near.items()]
+    found = [_why(detail, rank, int(touched[rank]), distance, rank in outside) for rank, distance in near.items()]
     return sorted(found, key=lambda w: (w.distance, w.object))
 
 
-def _why(detail: RayDetail, rank: int, samples: int, distance: float) -> WhyNot:
+def _why(detail: RayDetail, rank: int, samples: int, distance: float, out_of_bounds: bool) -> WhyNot:
     stack, ends = detail.stack, detail.ends
     item = int(stack.ids[rank])
-    reason = unmet(stack, detail.shots, rank, samples)
+    reason = unmet(stack, detail.shots, rank, samples, out_of_bounds)
     if reason is not None:
         return WhyNot(item, reason, samples, {}, distance)
     pairs = np.flatnonzero(detail.every.rank == rank)
@@ -298,8 +302,6 @@ def nearest_miss(detail: RayDetail, hit: Set[int]) -> Miss | None:
     passed = ~stack.occluder & ~refused(stack, every, detail.shots, np.zeros(len(stack), np.int64))
     passed[detail.touched] = False
     passed &= ~np.isin(stack.owner, stack.owner[np.isin(stack.ids, list(hit))])
-    if detail.bounds is not None:
-        passed &= meets(np.array(detail.bounds), stack.box_xyxy)
     found = _gaps(detail, np.flatnonzero(passed).tolist(), detail.bounds, None)
     if not found:
         return None
@@ -321,6 +323,8 @@ def _gaps(detail: RayDetail, objects: list[int], bounds: Box | None, most: float
     begin = (rays.start_256 - SUB * origin) / SUB
     end = begin + detail.ends.fraction[:, None] * (rays.step_256 / SUB)
     wide = detail.lines.radius / SUB
+    if bounds is not None:
+        objects = [rank for rank in objects if meets(np.array(bounds), stack.box_xyxy[rank])]
     boxes_xyxy = stack.box_xyxy[objects] if bounds is None else clipped(stack.box_xyxy[objects], bounds)
     boxes = squares(boxes_xyxy, origin)
     least = np.full(len(objects), np.inf)
@@ -331,7 +335,7 @@ def _gaps(detail: RayDetail, objects: list[int], bounds: Box | None, most: float
     for place in np.argsort(least, kind="stable").tolist():
         if least[place] > limit:
             break
-        spans = _spans_in(stack, objects[place], boxes_xyxy[place])
+        spans = pixels_in(stack, objects[place], bounds)
         if not len(spans):
             continue
         runs = squares(np.stack([spans.x_first, spans.y, spans.x_last, spans.y], axis=1), origin)
@@ -342,12 +346,6 @@ def _gaps(detail: RayDetail, objects: list[int], bounds: Box | None, most: float
             found[objects[place]] = max(distance - wide, 0.0), ray, (at[0], at[1]), (to[0], to[1])
             limit = distance if most is None else limit
     return found
-
-
-def _spans_in(stack: Stack, rank: int, box_xyxy: Ints) -> Spans:
-    """Pixels of an item within a part of its box."""
-    (left, top), (x, y, x_max, y_max) = stack.box_xyxy[rank, :2].tolist(), box_xyxy.tolist()
-    return Spans.from_mask(stack.mask(rank)[y - top : y_max - top + 1, x - left : x_max - left + 1], (x, y))
 
 
 def squares(boxes_xyxy: Ints, origin: Ints) -> Floats:

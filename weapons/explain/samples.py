@@ -82,12 +82,13 @@ class WhyNot(NamedTuple):
     """Why an object near the shot was not hit.
 
     `samples` counts the samples on the object, `by` those that each item ended, as {id: samples}, and `distance` is the
-    distance from the pattern, px, 0 if a sample lies on the object. `reason` is one of:
+    distance from the pattern, px, 0 if a sample lies on the object. Else only its pixels within the bounds count, if it
+    has any. `reason` is one of:
 
     - "missed": no sample lies on it
     - "category", "excluded": the filter refuses it
     - "behind": every sample on it ended in front of it
-    - "outside": it lies out of bounds
+    - "outside": it lies out of bounds, or all samples on it do
     - "inside": the ray starts in it and ignores that
     - "tunnelled": a projectile went through it between two tests
     - "budget": the ray had a budget of 0
@@ -115,6 +116,7 @@ class Detail:
     rank: Ints  # of the item that decided a sample's verdict, -1 for none
     ended: Ints  # rank of the item that ended the walk of each sample, -1 for none
     sheltered: Bools  # whether an item on the way to a sample decided
+    bounds: Box | None  # of the scene
 
     @cached_property
     def start(self) -> Ints:
@@ -252,9 +254,16 @@ def why_not_of(detail: Detail, hit: Set[int]) -> list[WhyNot]:
     boxes = placements.boxes + np.array([-NEAR_PX, -NEAR_PX, NEAR_PX, NEAR_PX])
     near = np.unique(pairs_of(boxes, placements.shot, detail.shots, stack).rank)
     near = near[~stack.occluder[near] & ~np.isin(stack.ids[near], list(hit))]
-    apart = {rank: math.sqrt(_distance2(detail.runs, stack, rank)) for rank in near.tolist()}
-    found = [_why(detail, rank, distance) for rank, distance in apart.items() if distance <= NEAR_PX]
-    return sorted(found, key=lambda w: (w.distance, w.object))
+    found = [_why(detail, rank, *_apart(detail, rank)) for rank in near.tolist()]
+    return sorted((why for why in found if why.distance <= NEAR_PX), key=lambda w: (w.distance, w.object))
+
+
+def _apart(detail: Detail, rank: int) -> tuple[float, bool]:
+    """Distance of an object from the pattern, px, by its pixels within the bounds; and whether it has none there."""
+    inside = pixels_in(detail.stack, rank, detail.bounds)
+    pixels = inside if len(inside) else pixels_in(detail.stack, rank, None)
+    distance = 0.0 if len(detail.on(rank)) else math.sqrt(_distance2(detail.runs, pixels))
+    return distance, not len(inside)
 
 
 def detail_of(context: QueryContext, weapon: Weapon, shots: Shots) -> Detail:
@@ -294,7 +303,7 @@ def detail_of(context: QueryContext, weapon: Weapon, shots: Shots) -> Detail:
         rank[outside] = ended[outside] = -1
         hidden &= ~outside
     hit = _inside(events.take(np.flatnonzero(events.kind == HIT)), runs, bounds)
-    return Detail(stack, shots, placements, runs, run, x, hit, verdict, rank, ended, hidden)
+    return Detail(stack, shots, placements, runs, run, x, hit, verdict, rank, ended, hidden, bounds)
 
 
 def _refused_first(events: Events, start: Ints, samples: int) -> Ints:
@@ -316,7 +325,7 @@ def _inside(events: Events, runs: Runs, bounds: Box | None) -> Events:
     return Events(events.kind, events.rank, events.run, first, last).take(np.flatnonzero(kept))
 
 
-def _why(detail: Detail, rank: int, distance: float) -> WhyNot:
+def _why(detail: Detail, rank: int, distance: float, out_of_bounds: bool) -> WhyNot:
     """Why one object was not hit."""
     stack, shot = detail.stack, detail.shots
     on = detail.on(rank)
@@ -324,21 +333,20 @@ def _why(detail: Detail, rank: int, distance: float) -> WhyNot:
     ranks, counts = np.unique(ended[ended >= 0], return_counts=True)
     by = dict(zip(stack.ids[ranks].tolist(), counts.tolist(), strict=True))
     outside = (detail.verdict[on] == Verdict.OUTSIDE).all()
-    reason = unmet(stack, shot, rank, len(on)) or ("outside" if outside else "behind")
+    reason = unmet(stack, shot, rank, len(on), out_of_bounds) or ("outside" if outside else "behind")
     return WhyNot(int(stack.ids[rank]), reason, len(on), by, distance)
 
 
-def unmet(stack: Stack, shot: Shots, rank: int, samples: int) -> str | None:
+def unmet(stack: Stack, shot: Shots, rank: int, samples: int, out_of_bounds: bool) -> str | None:
     """Reason why an item was not hit that does not depend on what lies before it, as in `WhyNot`."""
     if refused(stack, np.array([rank]), shot, np.zeros(1, np.int64))[0]:
         return "excluded" if int(stack.categories[rank]) & int(shot.meets[0]) else "category"
-    return None if samples else "missed"
+    return "outside" if out_of_bounds else None if samples else "missed"
 
 
-def _distance2(runs: Runs, stack: Stack, rank: int) -> int:
-    """Least squared distance between the pixels of a pattern and an item, px^2; not exact beyond NEAR_PX."""
-    x, y, x_max, y_max = stack.box_xyxy[rank].tolist()
-    spans = spans_of(stack, rank)
+def _distance2(runs: Runs, spans: Spans) -> int:
+    """Least squared distance between the pixels of a pattern and those of an item, px^2; not exact beyond NEAR_PX."""
+    x, y, x_max, y_max = spans.box_xyxy or (0, 0, -1, -1)
     near = (runs.y >= y - NEAR_PX) & (runs.y <= y_max + NEAR_PX)
     near &= (runs.x_last >= x - NEAR_PX) & (runs.x_first <= x_max + NEAR_PX)
     runs = runs.take(near)
@@ -372,7 +380,9 @@ def _part(part_xyxy: Ints, box_xyxy: Ints) -> tuple[slice, slice]:
     return slice(y, max(y, y_end)), slice(x, max(x, x_end))
 
 
-def spans_of(stack: Stack, rank: int) -> Spans:
-    """Pixels of an item of the stack."""
-    x, y = stack.box_xyxy[rank, :2].tolist()
-    return Spans.from_mask(stack.mask(rank), (x, y))
+def pixels_in(stack: Stack, rank: int, bounds: Box | None) -> Spans:
+    """Pixels of an item of the stack that lie within the bounds."""
+    own = stack.box_xyxy[rank]
+    part = own if bounds is None else clipped(own[None], bounds)[0]
+    (x, y), rows_and_columns = part[:2].tolist(), _part(part, own)
+    return Spans.from_mask(stack.mask(rank)[rows_and_columns], (x, y))
