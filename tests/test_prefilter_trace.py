@@ -29,7 +29,7 @@ from hitplanes import (
 )
 from hitplanes.weapons.cli.command import main
 from hitplanes.weapons.cli.report_file import REPORT
-from hitplanes.weapons.report.canvas import factor_of
+from hitplanes.weapons.report.canvas import _footer, factor_of
 from hitplanes.weapons.report.differences import differences
 from hitplanes.weapons.report.picture import picture_of_report
 from hitplanes.weapons.report.prefilter_trace import CELLS_MAX, PATTERNS_MAX
@@ -103,6 +103,17 @@ def test_volumes_and_cells_are_drawn_and_in_the_legend(prefilter: str | None, br
     assert ("cell" in drawn) <= (broadphase in ("grid", "quadtree", "bvh"))
     if broadphase == "grid":
         assert "cell" in drawn
+
+
+def test_the_footer_leaves_out_nothing_that_is_drawn() -> None:
+    """The call itself needed no volume: what is drawn is what a call that asks for them would test."""
+    scene = yard()
+    plain, drawn = (
+        _footer(report(scene, Disc(20), (90, 60), **how), 2000, 100)[1].text.split("left out: ")[1]
+        for how in ({}, {"prefilter": "4 boxes", "broadphase": "quadtree"})
+    )
+    assert "broad phase" in plain and "volumes" in plain and "weights" in drawn
+    assert "broad phase" not in drawn and "volumes" not in drawn
 
 
 def test_a_volume_is_drawn_around_its_object() -> None:

@@ -428,7 +428,8 @@ def _footer(report: Mapping[str, Any], width: int, height: int) -> list[Text]:
     scene = report["scene"]
     plans = [shot["plan"] for shot in report["shots"]] + (report["batch"]["plan"] if report["batch"] else [])
     ran = dict.fromkeys(stage["stage"] for plan in plans for stage in plan["ran"])
-    left = [s["stage"] for s in plans[0]["left_out"]] if plans else []
+    drawn = ("pre-filter", "broad phase", "volumes") if "filter" in report else ()
+    left = [s["stage"] for s in plans[0]["left_out"] if s["stage"] not in drawn] if plans else []
     left = [name for name in left if all(name in [s["stage"] for s in plan["left_out"]] for plan in plans)]
     source = f"scene {scene['hash']}, version {scene['version']}, hitplanes {report['version']}"
     plan = "; ".join(f"{word}: {', '.join(stages)}" for word, stages in (("ran", ran), ("left out", left)) if stages)
