@@ -15,6 +15,7 @@ from hitplanes.weapons.cli.command import main
 from hitplanes.weapons.cli.report_file import read_report
 from hitplanes.weapons.report.canvas import factor_of
 from hitplanes.weapons.report.differences import differences
+from hitplanes.weapons.report.overlay import Overlay
 from hitplanes.weapons.report.picture import AROUND, compared_pixels, picture_of_difference
 from hitplanes.weapons.report.symbols import MARKS
 
@@ -30,6 +31,21 @@ def yard(x: int = 20) -> Scene:
 
 def shot_at(scene: Scene, x: int = 24) -> dict[str, Any]:
     return report_of(scene, [fire(scene, Disc(8), (x, 20))])
+
+
+def test_only_shots_that_differ_are_numbered(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All are if none differs, or if the shots are not as many as they were."""
+    numbered: list[int] = []
+    monkeypatch.setattr(Overlay, "shot", lambda _, shot, number: numbered.append(number))
+
+    def numbers(*places: list[tuple[int, int]]) -> list[int]:
+        numbered.clear()
+        picture_of_difference(*(report_of(scene, [fire(scene, Disc(2), at)]) for at in places), (scene, scene))
+        return sorted(numbered)
+
+    scene, first = yard(), [(3, 3), (20, 20), (50, 30)]
+    assert numbers(first, [(3, 3), (21, 20), (50, 30)]) == [1, 1]
+    assert numbers(first, first) == [0, 0, 1, 1, 2, 2] and numbers(first, first[:2]) == [0, 0, 1, 1, 2]
 
 
 def by_hand(a: dict[str, Any], b: dict[str, Any]) -> dict[str, int]:

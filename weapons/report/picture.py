@@ -162,7 +162,10 @@ def picture_of_difference(
         World(scene, report["scene"]["bounds_xyxy"], view, factor)
         for scene, report in zip(scenes, (expected, got), strict=True)
     ]
-    sides = [(world.image, _marked(world, report)) for world, report in zip(worlds, (expected, got), strict=True)]
+    numbered = _changed(expected["shots"], got["shots"])
+    sides = [
+        (world.image, _marked(world, report, numbered)) for world, report in zip(worlds, (expected, got), strict=True)
+    ]
     sides.append((_difference(got, scenes[1], kinds, view, factor), []))
     painted = worlds[0].painted | worlds[1].painted
     wide = sides[0][0].shape[1] + 2 * EDGE
@@ -220,8 +223,17 @@ def _around(a: Box, b: Box) -> Box:
     return (x, y, x_max, y_max) if max(x_max - x, y_max - y) <= 2 * VIEW_MAX else a
 
 
-def _marked(world: World, report: Mapping[str, Any]) -> list[Text]:
-    """Mark the samples of one report, and number its shots."""
+def _changed(expected: Sequence[Any], got: Sequence[Any]) -> set[int]:
+    """Places of the shots whose samples or rows differ; of all, if none do or if they are not the same number."""
+    every = set(range(max(len(expected), len(got))))
+    if len(expected) != len(got):
+        return every
+    seen = [[(shot["samples"], shot["rows"]) for shot in shots] for shots in (expected, got)]
+    return {place for place, (was, now) in enumerate(zip(*seen, strict=True)) if was != now} or every
+
+
+def _marked(world: World, report: Mapping[str, Any], numbered: Set[int]) -> list[Text]:
+    """Mark the samples of one report, and number some of its shots, by their places."""
     world.mark_samples(report["shots"], OF_RAYS)
     for verdict in MARKS if report["batch"] else ():
         world.mark_heat(report["batch"], verdict)
@@ -231,7 +243,8 @@ def _marked(world: World, report: Mapping[str, Any]) -> list[Text]:
     overlay = Overlay(world)
     overlay.taken |= drawn
     for number, shot in enumerate(report["shots"]):
-        overlay.shot(shot, number)
+        if number in numbered:
+            overlay.shot(shot, number)
     return [*numbers, *overlay.texts]
 
 
