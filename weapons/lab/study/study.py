@@ -489,10 +489,11 @@ def work_precision(question: Mapping[str, Any], title: str) -> Figure:
         _write_words(plot, found, floor)
         _draw_axes(plot, question)
         if wrong:  # the smallest error rate that this number of shots can show
-            _draw_level(plot, least, (6, 3), 0.8, "3/n", (1.0, 3, 0), va="center", fontsize=7.5, color=FAINT)
+            text = f"3/n = {least:.2g}"
+            _draw_level(plot, least, (6, 3), 0.8, text, (1.0, 3, 0), va="center", fontsize=7.5, color=FAINT)
         if any(place.error == 0 for place in found):
             plot.set_ylim(bottom=floor / 1.8)
-            text = f"none wrong in {question['shots']} shots: under 3/n = {least:.2g}" if wrong else "no error"
+            text = f"none wrong in {question['shots']} shots: the rate is likely under 3/n" if wrong else "no error"
             _draw_level(plot, floor, (2, 3), 1, text, (0.01, 0, -11), fontsize=8, color=INK)
         plot.set_title(f"{title}\n{question['asks']}", loc="left", weight="bold", size=11)
         figure.legend(loc="outside right upper", frameon=False, fontsize=9, title="method", alignment="left")
