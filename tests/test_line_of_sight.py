@@ -488,6 +488,17 @@ def test_far_away_and_far_reaching() -> None:
     assert all(row == rows[0] for row in rows) and 0 < len(rows[0]) < 5
 
 
+def test_only_samples_on_items_are_looked_at_for_rows() -> None:
+    """A blast of three thousand million pixels, and three small items."""
+    scene = Scene()
+    for x, role in ((500, "hittable"), (-400, "hittable"), (550, "occluder")):
+        scene.add(np.ones((9, 9), np.bool_), (x, 0), role=role)
+    for sight in SIGHTS:
+        hits = fire(scene, Disc(32_000, line_of_sight=sight), (0, 0))
+        assert [(row.object, row.pixels) for row in hits] == [(1, 81), (0, 81)]
+        assert max(stage.bytes_made for stage in hits.plan.ran) < 10**7
+
+
 def test_cover_in_files_logs_records_and_the_past(tmp_path: Path) -> None:
     """Scene file, record and replay, log of shots, golden's report, and a rewind all keep the line of sight."""
     scene, weapon = street(), Spread(Disc(30, line_of_sight="all", inside="ignore_until_exit"), 2, 3)

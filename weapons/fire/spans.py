@@ -103,15 +103,18 @@ class SpanHits:
     counts: Ints
 
 
-def direct(placements: Placements, shots: Shots, context: QueryContext) -> SpanHits:
-    """Walk the stack under every placement, but only where an item may be."""
+def direct(placements: Placements, shots: Shots, context: QueryContext, counted: bool = False) -> SpanHits:
+    """Walk the stack under every placement, but only where an item may be.
+
+    If the counts are asked for, samples on no item that lie sheltered are looked at, too; else they count as empty.
+    """
     boxes = placements.boxes
     counts = inside(placements, boxes, context)
     if not len(context.stack):
         return _met(placements, Runs.joined([]), [], counts, context.plan)
     placement, rank = near_pairs(placements, np.arange(len(boxes)), boxes, context)
     pairs = Pairs(placement, rank, _kinds(rank, placements.shot[placement], shots, context))
-    if context.blockers is not None and len(boxes):  # what lies on no item may be sheltered, too
+    if counted and context.blockers is not None and len(boxes):
         every = np.arange(len(boxes))
         runs = _laid(placements, every, boxes if context.bounds is None else clipped(boxes, context.bounds))
     else:

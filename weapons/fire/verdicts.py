@@ -91,6 +91,6 @@ def _by_spans(request: Request) -> Ints:
     weapon, shots = request.weapon, request.shots
     verdicts = [np.zeros((0, len(OF_PATTERNS)), np.int64)]
     for _, part in chunks(shots, placements_for(weapon, shots.take(0, 1)), request.candidates):
-        counts = direct(placements_for(weapon, part), part, request).counts
+        counts = direct(placements_for(weapon, part), part, request, counted=True).counts
         verdicts.append(counts.reshape(len(part), -1, len(OF_PATTERNS)).sum(axis=1))
     return np.concatenate(verdicts)
