@@ -200,6 +200,9 @@ def test_the_page_is_that_of_the_last_run_that_used_the_fixture(game: pytest.Pyt
     assert summary(every) == [f"5 goldens failed: {FOLDER}/{PAGE}"]
     page = game.path / FOLDER / PAGE
     assert page.read_text().count("<h2") == 5
+    names = re.findall(r"</a>: goldens/test_gun/(.*?).json</li>", page.read_text())
+    assert len(names) == 5 and {"test_one", "test_two"} < set(names)
+    assert "<figcaption>got (goldens have no text)</figcaption>" in page.read_text()
     game.runpytest_inprocess("-k", "test_without")
     assert page.read_text().count("<h2") == 5, "a run that did not use it leaves it alone"
     game.runpytest_inprocess("-x")

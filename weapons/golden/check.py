@@ -60,6 +60,7 @@ HASH = np.array([73_856_093, 19_349_663, 83_492_791], np.uint64)
 Plane = npt.NDArray[Any]
 
 Row = list[tuple[str, str]]  # caption and file of pictures that are shown side by side
+TEXTLESS = " (goldens have no text)"
 
 
 def pictures_of(changed: Unlike) -> list[str]:
@@ -79,14 +80,16 @@ def draw_difference(folder: Path, expected: Golden | None, got: Golden, changed:
         pair = [] if expected is None or got.whole is None else reports_of_hits(got.whole, expected.report, got.report)
         if pair and changed.hits:
             write_png(folder / COMPARED, picture_of_difference(pair[0], pair[1], (got.scene, got.scene)))
-        return [[("hits: expected, got, difference", COMPARED)]] * bool(pair and changed.hits) + [[("got", "got.png")]]
+        return [[("hits: expected, got, difference", COMPARED)]] * bool(pair and changed.hits) + [
+            [(f"got{TEXTLESS}", "got.png")]
+        ]
     write_png(folder / "expected.png", expected.picture)
     rows: list[Row] = []
     if changed.hits:
         scenes = scene_of(expected), got.scene
         write_png(folder / COMPARED, picture_of_difference(expected.report, got.report, scenes))
         rows += [[("hits: expected, got, difference", COMPARED)]]
-    rows += [[("expected", "expected.png"), ("got", "got.png")]]
+    rows += [[(f"expected{TEXTLESS}", "expected.png"), (f"got{TEXTLESS}", "got.png")]]
     if changed.picture:
         was, now = opaque(expected.picture), opaque(got.picture)
         rows[-1] += [("difference", "difference.png")]
@@ -275,7 +278,10 @@ def _page(failures: Sequence[dict[str, Any]]) -> str:
     count = f"{counted(len(failures), 'golden')} failed"
     parts = [f"<h1>{count}</h1>"]
     if len(failures) > 1:
-        links = (f'<li><a href="#{i}">{_escaped(f["test"])}</a></li>' for i, f in enumerate(failures))
+        links = (
+            f'<li><a href="#{i}">{_escaped(f["test"])}</a>: {_escaped(f["golden"])}</li>'
+            for i, f in enumerate(failures)
+        )
         parts.append(f"<ol>{''.join(links)}</ol>")
     parts += [_section(i, failure) for i, failure in enumerate(failures)]
     head = f'<meta charset="utf-8"><title>{count}</title><style>{STYLE}</style>'
