@@ -26,10 +26,11 @@ from ..fire.hits import HitRow
 from ..fire.prefilter import filters_of
 from ..kinds.areas import ray_parts_of
 from ..kinds.placements import STRAIGHT, ZEROS
-from ..kinds.rays import RayWeapon, unspent
+from ..kinds.rays import RayWeapon, ends_at_first, unspent
 from ..kinds.weapon import Weapon
 from ..rays import raycast
-from ..rays.contacts import NEVER, Rays, Touches, endless
+from ..rays.contacts import NEVER, Rays, Reason, Terminations, Touches, endless
+from ..rays.first_hit import FirstHits
 from ..rays.one_ray import Follow, Followed, chosen_follower
 from ..rays.ray_hits import Later, RayHits, Walk, weights_at
 from ..rays.ray_walk import lines_of
@@ -52,12 +53,23 @@ def ray_along(start: tuple[int, int], step: tuple[int, int]) -> Rays:
     return Rays(start_256, np.array([step]), pixel(start_256), shot=zero, round=zero, pellet=zero)
 
 
+def _first_end(rays: Rays, met: list[list[int]]) -> Terminations:
+    """The end of one ray in the object that it hits, or at its range; `met` is that of `Followed`."""
+    ends = endless(1)
+    for rank, _, x, y, entry in met:
+        left, top = rays.origin_xy[0].tolist()
+        ends.reason[0], ends.rank[0], ends.time[0] = Reason.HITS, rank, entry
+        ends.x[0], ends.y[0] = x - left, y - top
+    return ends
+
+
 class OneRay(OneShot, RayHits):
     """Answer of one prepared ray: a list of its rows; all else is made when it is asked for."""
 
-    __slots__ = ("_arguments", "_line")  # set at each shot
+    __slots__ = ("_arguments", "_followed", "_line")  # set at each shot
 
     _line: Line
+    _followed: Followed
 
     @cached_attribute
     def _weighted(self) -> bool:
@@ -65,11 +77,14 @@ class OneRay(OneShot, RayHits):
         return parts is not None and parts[2].fades is not None
 
     @cached_property
-    def _walk(self) -> Walk:
-        """The ray as a batch of one, followed anew in the snapshot of the scene."""
+    def _ended(self) -> Walk | FirstHits:
+        """The ray as a batch of one. Unless its end is known, it is followed anew in the snapshot of the scene."""
         parts, stack, bounds = ray_parts_of(self.weapon), self._present.stack, self._present.bounds
         assert parts is not None  # it was prepared as one
         rays, ray = ray_along(*self._line), parts[2]
+        time, met = self._followed
+        if ends_at_first(ray) and (met or time == NEVER):
+            return FirstHits(rays, ray, _first_end(rays, met), stack)
         lines = Lines(rays.start_256, rays.step_256, ray.radius_256)
         filters = filters_of(stack, self._present.filter.shot_at_origin(None, 0), rays.shot)
         cast = stack, bounds, lines, ray.hits_most, filters
@@ -81,9 +96,9 @@ class OneRay(OneShot, RayHits):
     @cached_attribute
     def _later(self) -> Later:
         def verdicts() -> Ints:
-            return late.ray_verdicts.verdicts_of([(0, self._walk)], self.shots, self._present.bounds)
+            return late.ray_verdicts.verdicts_of([(0, self._ended)], self.shots, self._present.bounds)
 
-        return Later(lambda: self._walk.passes, lambda: self._walk.stops, verdicts)
+        return Later(lambda: self._ended.passes, lambda: self._ended.stops, verdicts)
 
 
 class ReadyRay(Ready[RayHits]):
@@ -122,7 +137,7 @@ class ReadyRay(Ready[RayHits]):
             return Ready.fire(self, at, aim, toward, shot)
         hits: OneRay = OneRay()
         hits._present, hits._at, hits._arguments = self._present, place, (angle, target, number)
-        hits._line = start, step
+        hits._line, hits._followed = (start, step), followed
         found = followed[1]
         if self._budget_256 and found:
             found = self._before_spent(start, step, self._budget_256, followed)
