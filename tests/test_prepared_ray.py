@@ -125,6 +125,22 @@ THROUGH = [
 ]  # fmt: skip
 
 
+@pytest.mark.parametrize("aim", [0, 45, 30])
+def test_a_budget_that_just_lasts_and_one_that_does_not(kernels: ModuleType, aim: float) -> None:
+    """Through boards of 9 px, one behind the other."""
+    scene = Scene()
+    for distance in (20, 40, 60):
+        scene.add(Sprite.box(9, 60), (distance * unit(aim)[0] / 2**30, distance * unit(aim)[1] / 2**30), angle=aim)
+    seen = set()
+    for budget in np.arange(4, 34, 0.5).tolist():
+        weapon = Rifle(90, budget=budget)
+        hits = prepare(scene, weapon).fire((0, 0), aim)
+        assert type(hits) is OneRay
+        same(hits, fire(scene, weapon, (0, 0), aim=aim, strategy="walk"))
+        seen.add(len(hits))
+    assert seen == {1, 2, 3}
+
+
 @examples(30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.integers(0, 2**32))
 def test_rays_that_go_on_through_corners_and_along_edges(kernels: ModuleType, seed: int) -> None:

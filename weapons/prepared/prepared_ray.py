@@ -139,7 +139,7 @@ class ReadyRay(Ready[RayHits]):
         hits._present, hits._at, hits._arguments = self._present, place, (angle, target, number)
         hits._line, hits._followed = (start, step), followed
         found = followed[1]
-        if self._budget_256 and found:
+        if self._budget_256 and self._may_spend(found, self._budget_256):
             found = self._before_spent(start, step, self._budget_256, followed)
         for rank, count, x, y, entry in found:
             column, row = x - ((start[0] + HALF) >> 8), y - ((start[1] + HALF) >> 8)
@@ -152,6 +152,13 @@ class ReadyRay(Ready[RayHits]):
         """Whether a ray that was cast to its end begins in an item that is not hit, or with a budget of 0."""
         starts_inside = self._ray.inside != "hit" and (end == 0 or (found and found[0][ENTRY] == 0))
         return bool(starts_inside) or self._budget_256 == 0
+
+    def _may_spend(self, found: list[list[int]], budget_256: int) -> bool:
+        """Whether what a ray hits is enough to use its budget up."""
+        cost = self._present.cost
+        assert cost is not None  # its weapon has a budget
+        cells = sum(cost.item(rank) * count for rank, count, *_ in found)
+        return cells * raycast.longest_in_cell(self._ray.radius_256) >= budget_256
 
     def _before_spent(
         self, start: tuple[int, int], step: tuple[int, int], budget_256: int, followed: Followed

@@ -120,11 +120,11 @@ def cast_rays(rays: Rays, ray: RayWeapon, shots: Shots, through: Range) -> list[
 def spent(walk: Walk, cost: Ints, budget_256: int) -> Walk:
     """Rays as they end by a budget, from the same rays without one; `cost` (M,) is that of a px of each item.
 
-    A ray is no longer in a cell than its width and the cell's diagonal, so that most rays cannot spend all. Of those
-    that hit many objects, most end in the first few of them, which are looked at beforehand.
+    Most rays cannot spend all. Of those that hit many objects, most end in the first few of them, which are looked at
+    beforehand.
     """
     hit, ray = walk.hit, walk.hit.ray
-    most = np.bincount(ray, cost[hit.rank] * hit.count, len(walk.rays)) * (2 * (DIAGONAL + walk.lines.radius))
+    most = np.bincount(ray, cost[hit.rank] * hit.count, len(walk.rays)) * longest_in_cell(walk.lines.radius)
     looked = (most >= budget_256)[ray]
     many = np.flatnonzero(looked & (np.bincount(ray, minlength=len(most))[ray] > 2 * FEW))
     if len(many):
@@ -134,6 +134,11 @@ def spent(walk: Walk, cost: Ints, budget_256: int) -> Walk:
     ends, walked[pairs] = _ends_by_budget(walk, pairs, cost, budget_256)
     count = np.where(ends.reason[ray] == Reason.BUDGET, walked, hit.count)
     return replace(walk, hit=replace(hit, count=count).take(np.flatnonzero(count)), ends=ends)
+
+
+def longest_in_cell(radius_256: int) -> int:
+    """Bound on the way of a ray in a cell, 1/256 px: its width and the diagonal of the cell."""
+    return 2 * (DIAGONAL + radius_256)
 
 
 def _ends_by_budget(walk: Walk, pairs: Ints, cost: Ints, budget_256: int) -> tuple[Terminations, Ints]:
