@@ -445,12 +445,27 @@ def test_a_folder_of_somebody_else_is_not_written_to(golden: Callable[..., Outco
     (folder / "mine.txt").write_text("x")
     outcome = golden(shot(width=50))
     assert "scene: bounds_xyxy" in outcome.message
-    assert f"look: nowhere: {FOLDER} is there, and not ours" in outcome.message
+    assert f"look: nowhere: {FOLDER} is there, and not ours: move or remove it\n" in outcome.message
     assert not replace_page(folder, [outcome.failure])
     assert [p.name for p in folder.iterdir()] == ["mine.txt"]
     (folder / "mine.txt").unlink()
     assert FOLDER + "/" + PAGE in golden(shot(width=50)).message, "an empty one is nobody's"
     assert sorted(p.name for p in tmp_path.iterdir()) == ["goldens", FOLDER]
+
+
+def test_a_folder_of_hidden_files_is_taken_and_keeps_them(golden: Callable[..., Outcome], tmp_path: Path) -> None:
+    folder, hidden = tmp_path / FOLDER, {f"{FOLDER}/.DS_Store", f"{FOLDER}/one/.DS_Store"}
+    (folder / "one").mkdir(parents=True)
+    for path in hidden:
+        (tmp_path / path).write_text("x")
+    for _ in range(2):
+        outcome = golden(shot(width=50))
+        assert f"look: {FOLDER}/{PAGE}" in outcome.message
+        assert replace_page(folder, [outcome.failure])
+        assert not replace_page(folder, [])
+        assert {p.relative_to(tmp_path).as_posix() for p in folder.rglob("*") if p.is_file()} == hidden
+    (folder / ".gitignore").write_text("mine")
+    assert not claimed(folder) and (folder / ".gitignore").read_text() == "mine"
 
 
 def test_the_page_shows_words_then_pictures_and_needs_nothing_else(

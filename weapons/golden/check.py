@@ -197,7 +197,8 @@ img { max-width: 100%; image-rendering: pixelated; background: #000; }
 def claimed(folder: Path) -> bool:
     """Make the folder with our mark in it; False if it exists and is not ours, or cannot be made.
 
-    Folder and mark appear in one step, so one of several processes makes them and the others see both.
+    Folder and mark appear in one step, so one of several processes makes them and the others see both. A folder of
+    hidden files alone, as file managers leave them, gets the mark and keeps its files.
     """
     if _is_ours(folder):
         return True
@@ -208,7 +209,11 @@ def claimed(folder: Path) -> bool:
         (aside / IGNORE).write_text("*\n", encoding="utf-8")
         with suppress(OSError):
             folder.rmdir()  # an empty folder belongs to nobody
-        put_in_place(aside, folder)
+        if _all_hidden(folder):
+            os.link(aside / LIST, folder / LIST)  # the file appears with its text, and never in place of another
+            os.link(aside / IGNORE, folder / IGNORE)
+        else:
+            put_in_place(aside, folder)
         note_files(folder, [IGNORE])
     for name in (LIST, IGNORE):
         with suppress(OSError):
@@ -320,6 +325,12 @@ def _is_ours(folder: Path) -> bool:
         return False
 
 
+def _all_hidden(folder: Path) -> bool:
+    """Whether a folder is there with no files but hidden ones; a .gitignore counts, as ours would go in its place."""
+    names = (name for _, _, files in os.walk(folder) for name in files)
+    return folder.is_dir() and all(name.startswith(".") and name != IGNORE for name in names)
+
+
 def _listed(folder: Path) -> list[str]:
     """Return the listed files, which lie in the folder or in a subfolder of it; other paths are ignored."""
     names = (folder / LIST).read_text(encoding="utf-8").splitlines()[1:]
@@ -425,7 +436,8 @@ def _show(
     failure |= {"folder": "", "texts": [], "rows": []}
     folder, name = call.root / FOLDER, safe_name(relative(call.base, call.root))
     if not claimed(folder):
-        return failure, f"nowhere: {printed(folder, call.here)} is there, and not ours"
+        why = "is there, and not ours: move or remove it" if folder.exists() else "cannot be made"
+        return failure, f"nowhere: {printed(folder, call.here)} {why}"
     texts = {"expected.json": expected, "got.json": got}
     try:
         note_files(folder, [f"{name}/{file}" for file in (*texts, *pictures_of(changed))])
