@@ -275,6 +275,8 @@ def test_set_takes_one_value_or_one_for_each() -> None:
     assert scene.ids("occluder").tolist() == [0, 1]
     scene.set([0, 1, 2], frame=0, flip="none", categories=["target"], layer=7, owner=0)
     assert items.categories[:3].tolist() == [2, 2, 2]
+    scene.set([0, 1], categories=[["target", "default"], []])
+    assert items.categories[:3].tolist() == [3, 0, 2]
     assert items.layer[:3].tolist() == [7, 7, 7]
     assert items.owner[:3].tolist() == [0, 0, 0]
     scene.set(range(3), angle=[0, 90, 45.5])
@@ -357,7 +359,10 @@ def test_a_change_of_one_thing_keeps_the_others() -> None:
         ({"ids": [0, 1], "categories": 2**32}, "categories: expected a whole number"),
         ({"ids": [0, 1], "categories": ["glas"]}, "categories: expected one of .*did you mean 'glass'"),
         ({"ids": [0, 1], "categories": "glas"}, "categories: expected one of .*did you mean 'glass'"),
-        ({"ids": [0, 1], "categories": [["glass"], ["glass", "target"]]}, "categor"),
+        ({"ids": [0, 1], "categories": [["glass"], ["glas"]]}, r"categories\[1\]: .*did you mean 'glass'"),
+        ({"ids": [0, 1], "categories": [["glass"], "glass"]}, r"categories\[1\]: expected a list of names, got"),
+        ({"ids": [0, 1], "categories": [["glass"], [4]]}, r"categories\[1\]: expected one of .*got 4"),
+        ({"ids": [0, 1], "categories": [["glass"]] * 3}, "categories: expected 2 lists of names, .*got 3"),
         ({"ids": [0, 1], "role": "occluders"}, "role: expected one of .*did you mean 'occluder'"),
     ],
 )  # fmt: skip

@@ -214,10 +214,11 @@ class Scene:
         layer: object = None, categories: object = None, owner: object = None, cost: object = None,
         velocity_xy: object = None, role: Role | str | None = None,
     ) -> None:  # fmt: skip
-        """Change objects, all or none; each value is one for all objects, or one per object.
+        """Change objects, all or none; each value is one for all objects, or one per object. `role` is one for all.
 
         `ids` is one id or several (n,). `scale` is a number, one per object (n,), pairs (n, 2) or (1, 2), or (sx, sy)
-        of one object; `sprite` is one for all, or a list (n,). The other parameters are those of `add`.
+        of one object; `sprite` is one for all, or a list (n,). `categories` of each object are an array of bits (n,),
+        or a list of n lists of names. The other parameters are those of `add`.
         """
         rows = self._existing(ids)
         n = len(rows)
@@ -525,6 +526,11 @@ class Scene:
         return self.category_bits(*listed("categories", categories, "bits or a list of names"), field="categories")
 
     def _bits_per_row(self, categories: object, n: int) -> Ints:
+        if isinstance(categories, list | tuple) and any(isinstance(names, list | tuple) for names in categories):
+            if len(categories) != n:
+                raise InputError(f"categories: expected {n} lists of names, one for each object, got {len(categories)}")
+            own = [listed(f"categories[{i}]", names, "a list of names") for i, names in enumerate(categories)]
+            return np.array([self.category_bits(*names, field=f"categories[{i}]") for i, names in enumerate(own)])
         values = array_of("categories", categories)
         if values.dtype.kind in "iu" and values.ndim:
             return integers("categories", values, (n,), 0, ALL)
