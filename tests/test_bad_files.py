@@ -79,17 +79,17 @@ def refused(words: list[str], told: str, capfd: pytest.CaptureFixture[str]) -> N
 
 SCENES: dict[str, tuple[Any, str]] = {
     # as a text
-    "empty": ("", "expected JSON in UTF-8: Expecting value"),
-    "zero bytes": (b"\0" * 100, "expected JSON in UTF-8"),
-    "byte order mark": ("\ufeff" + json.dumps(PLAIN), "expected JSON in UTF-8: Unexpected UTF-8 BOM"),
+    "empty": ("", "expected one JSON value: Expecting value"),
+    "zero bytes": (b"\0" * 100, "expected one JSON value"),
+    "byte order mark": ("\ufeff" + json.dumps(PLAIN), "expected one JSON value: Unexpected UTF-8 BOM"),
     "UTF-16": (json.dumps(PLAIN).encode("utf-16"), "expected JSON in UTF-8"),
     "Latin-1": (json.dumps(PLAIN).replace("duck", "\xe9").encode("latin-1"), "expected JSON in UTF-8: 'utf-8' codec"),
-    "Python": (repr(PLAIN), "expected JSON in UTF-8: Expecting property name enclosed in double quotes"),
-    "a comment": ("// a scene\n" + json.dumps(PLAIN), "expected JSON in UTF-8"),
-    "something after it": (json.dumps(PLAIN) + " x", "expected JSON in UTF-8: Extra data"),
+    "Python": (repr(PLAIN), "expected one JSON value: Expecting property name enclosed in double quotes"),
+    "a comment": ("// a scene\n" + json.dumps(PLAIN), "expected one JSON value"),
+    "something after it": (json.dumps(PLAIN) + " x", "expected one JSON value: Extra data"),
     "a list": ("[]", r"scene: expected an object, got \[\]"),
-    "10^5 deep": ("[" * 10**5 + "]" * 10**5, "expected JSON in UTF-8: .*recursion"),
-    "objects 10^5 deep": ('{"a":' * 10**5, "expected JSON in UTF-8: .*recursion"),
+    "10^5 deep": ("[" * 10**5 + "]" * 10**5, "expected one JSON value: .*recursion"),
+    "objects 10^5 deep": ('{"a":' * 10**5, "expected one JSON value: .*recursion"),
     "duplicate key": (json.dumps(PLAIN)[:-1] + ', "shots": []}', "key: expected each key once, got 'shots' again"),
     "duplicate key inside": (
         spelled(GUN, '{"kind": "disc", "kind": "point"}'), "key: expected each .*got 'kind' again"),
@@ -110,6 +110,7 @@ SCENES: dict[str, tuple[Any, str]] = {
     "name 900 deep": (spelled(f"{DUCK}.name", "[" * 900 + "]" * 900), r"hittable\[0\]: name: expected a text"),
     # the scene
     "format": (changed("format", "hitplanes-scene/9"), "format: expected 'hitplanes-scene/2', got 'hitplanes-scene/9'"),
+    "a report": (json.dumps({"format": "hitplanes-report/1", "version": "1"}), "format: .*got 'hitplanes-report/1'"),
     "no format": (changed("format", MISSING), "format: expected 'hitplanes-scene/2', got nothing"),
     "key": (changed("shot", []), "key: expected one of .*got 'shot' .did you mean 'shots'"),
     "name, surrogate": (spelled("name", r'"\ud800"'), r"name: expected a text .*got '\\ud800'"),

@@ -508,15 +508,15 @@ def test_a_shot_that_cannot_be_fired_is_named_with_its_line(match: Path) -> None
 
 
 LINES: dict[str, tuple[Callable[[bytes], bytes], str]] = {
-    "letters": (lambda line: b"x" + line, "expected JSON in UTF-8"),
-    "zeros": (lambda line: b"\0" * 60 + line[60:], "expected JSON in UTF-8"),
+    "letters": (lambda line: b"x" + line, "expected one JSON value"),
+    "zeros": (lambda line: b"\0" * 60 + line[60:], "expected one JSON value"),
     "no UTF-8": (lambda line: line.replace(b'"scene":"', b'"scene":"\xff'), "line 3"),
     "twice a key": (lambda line: line.replace(b"{", b'{"seed":1,', 1), "key: expected each key once, got 'seed' again"),
     "NaN": (lambda line: line.replace(b'"seed":0', b'"seed":NaN'), "seed: expected a finite number, got NaN"),
-    "empty": (lambda line: b"\n", "expected JSON in UTF-8"),
+    "empty": (lambda line: b"\n", "expected one JSON value"),
     "no object": (lambda line: b"[]\n", "shot: expected an object, got"),
-    "deep": (lambda line: b"[" * 10**5 + b"\n", "expected JSON in UTF-8: maximum recursion depth"),
-    "digits": (lambda line: line.replace(b'"seed":0', b'"seed":' + b"1" * 5000), "expected JSON in UTF-8: Exceeds"),
+    "deep": (lambda line: b"[" * 10**5 + b"\n", "expected one JSON value: maximum recursion depth"),
+    "digits": (lambda line: line.replace(b'"seed":0', b'"seed":' + b"1" * 5000), "expected one JSON value: Exceeds"),
 }
 
 
@@ -564,7 +564,7 @@ def test_headers_that_are_none(match: Path) -> None:
         b'{"format":"hitplanes-hits/1"}\n': "format: expected 'hitplanes-shots/3', got 'hitplanes-hits/1'",
         first + b"}\n": "version: expected a value, got nothing",
         first + b',"version":"1","rows":1}\n': "key: expected one of 'format', 'version', got 'rows'",
-        b"\x89PNG\r\n\x1a\n": "expected JSON in UTF-8",
+        b"\x89PNG\r\n\x1a\n": "expected one JSON value",
         lines[0]: "format: expected 'hitplanes-shots/3', got None",
         b"[]\n": "header: expected an object",
     }.items():

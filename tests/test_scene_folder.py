@@ -548,11 +548,11 @@ def test_a_folder_that_cannot_be_made_is_named(tmp_path: Path) -> None:
 
 
 BAD_FILES: dict[str, tuple[Any, str]] = {
-    "not JSON": ("{", r"expected JSON in UTF-8"),
-    "empty": ("", r"expected JSON in UTF-8"),
+    "not JSON": ("{", r"expected one JSON value"),
+    "empty": ("", r"expected one JSON value"),
     "a list": ("[]", r"scene: expected an object, got \[\]"),
-    "byte order mark": ("\ufeff{}", "expected JSON in UTF-8"),
-    "deep": ("[" * 200_000, "expected JSON in UTF-8"),
+    "byte order mark": ("\ufeff{}", "expected one JSON value"),
+    "deep": ("[" * 200_000, "expected one JSON value"),
     "many digits": ('{"format": ' + "1" * 5000 + "}", r"scene\.json: "),
     "duplicate key": ('{"format": 1, "name": "a", "name": "b"}', "key: expected each key once, got 'name' again"),
     "deep duplicate": ('{"weapons": {"w": {"kind": 1, "kind": 2}}}', "expected each key once, got 'kind' again"),

@@ -311,6 +311,13 @@ def test_a_report_is_read_and_named_when_it_is_bad(tmp_path: Path) -> None:
     path.write_text(json.dumps(batch))
     with pytest.raises(InputError, match="batch: heat: counts: hit: expected counts from 1, got 0"):
         read_report(path)
+    for text, message in (
+        ('{"format": "hitplanes-scene/2", "name": "a"}', r"r\.json: format: expected 'hitplanes-report/1', got"),
+        ("{}\n{}\n", r"r\.json: expected one JSON value: Extra data: line 2"),
+    ):
+        path.write_text(text)
+        with pytest.raises(InputError, match=message):
+            read_report(path)
     path.write_bytes(b"\xff")
     with pytest.raises(InputError, match="expected JSON in UTF-8"):
         read_report(path)

@@ -250,7 +250,7 @@ class Mapped:
 
 @dataclass(frozen=True)
 class Keys:
-    """An object with known keys, some of them required."""
+    """An object with known keys, some of them required; of a file, its format is checked before its other keys."""
 
     forms: Mapping[str, Value]
     needed: tuple[str, ...] = ()
@@ -258,6 +258,8 @@ class Keys:
     def check(self, name: str, value: object) -> dict[str, Any]:
         """Check that no key is unknown or missing, and check each value; errors begin with the key."""
         data = typed(name, value, dict)
+        if "format" in data and "format" in self.forms:
+            self.forms["format"].check("format", data["format"])
         for key in data:
             choice("key", key, self.forms)
         for key in self.needed:
@@ -303,7 +305,7 @@ def json_of(text: str) -> Any:
     except InputError:
         raise
     except (ValueError, RecursionError) as error:
-        raise InputError(f"expected JSON in UTF-8: {error}") from error
+        raise InputError(f"expected one JSON value: {error}") from error
     if odd:
         raise InputError(f"{place or 'number'}: expected a finite number, got {odd[0]}")
     return value
