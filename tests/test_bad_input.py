@@ -125,8 +125,10 @@ ARRAYS: dict[str, tuple[Any, str]] = {
     "ragged deep": ([1, [2]], r"at: expected an array with rows of one length, got \[1, \[2\]\]"),
     "in itself": ((loop := [1], loop.append(loop), loop)[2], r"at: expected an array .*, got \[1, \[1, \["),
     "10^5 deep": (DEEP, r"at: expected an array, got \[\[\["),
-    "5000 digits": ((1, DIGITS), r"at: expected numbers, got a list that is too long to show"),
-    "400 digits": ((1, 10**400), r"at: expected numbers, got \[1, 1000"),
+    "5000 digits": ((1, DIGITS), r"at\[1\]: expected a number within ±1099511627776, got a int that"),
+    "400 digits": ((1, -(10**400)), r"at\[1\]: expected a number within ±1099511627776, got -1000"),
+    "40 digits": ([(1, 2), (10**40, 2)], r"at\[1\]\[0\]: expected a number within ±1099511627776, got 1000"),
+    "true beside 40 digits": ((True, 10**40), r"at: expected numbers, got \[True, 1000"),
     "NaN": ((1, math.nan), r"at\[1\]: expected a finite number, got nan"),
     "NaN in a batch": ([(1, 2), (math.nan, 4)], r"at\[1\]\[0\]: expected a finite number, got nan"),
     "infinite": ((math.inf, 1), r"at\[0\]: expected a finite number, got inf"),
@@ -330,6 +332,7 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
         lambda: Box(2.5, 3), "width: expected a whole number from 1 .*got 2.5"),  # type: ignore[arg-type]
     "radius, text": (lambda: Disc("3"), "radius: expected a number, got '3'"),  # type: ignore[arg-type]
     "radius, list": (lambda: Disc([3]), r"radius: expected shape \(\), got \(1,\)"),  # type: ignore[arg-type]
+    "radius, 400 digits": (lambda: Disc(10**400), "radius: expected a number from 0 to 1048576, got 1000"),
     "radius, true": (lambda: Disc(True), "radius: expected a number, got True"),
     "radius, masked": (
         lambda: Disc(np.ma.masked), "radius: expected a value, got a masked one"),  # type: ignore[arg-type]

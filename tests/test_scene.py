@@ -353,6 +353,7 @@ def test_a_change_of_one_thing_keeps_the_others() -> None:
         ({"ids": [0, 1], "frame": [0, 1]}, "row 1: frame: expected a whole number from 0 to 0, got 1"),
         ({"ids": [0, 1], "frame": [0, 0.5]}, r"frame\[1\]: expected a whole number"),
         ({"ids": [0, 1], "layer": [0, 2**40]}, r"layer\[1\]: expected a whole number"),
+        ({"ids": [0, 1], "layer": [0, 10**400]}, r"layer\[1\]: expected a whole number from .*got 1000"),
         ({"ids": [0, 1], "layer": [1, 2, 3]}, r"layer: expected shape \(2,\), got \(3,\)"),
         ({"ids": [0, 1], "owner": [0, 3]}, r"owner\[1\]: expected a whole number from 0 to 2, got 3"),
         ({"ids": [0, 1], "categories": [1, 2**32]}, r"categories\[1\]: expected a whole number"),

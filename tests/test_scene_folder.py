@@ -616,7 +616,8 @@ BAD_OBJECTS: dict[str, tuple[dict[str, Any], str]] = {
     "position null": ({"circle": 3, "position_xy": [1, None]}, "position_xy: expected numbers"),
     "position ragged": ({"circle": 3, "position_xy": [1, [2]]}, "position_xy: expected"),
     "position far": ({"circle": 3, "position_xy": [0, 2e12]}, r"position_xy\[1\]: expected a number within"),
-    "position infinite": ({"circle": 3, "position_xy": [0, 10**400]}, "position_xy: expected"),
+    "400 digits of a position": (
+        {"circle": 3, "position_xy": [0, 10**400]}, r"position_xy\[1\]: expected a number within"),
     "unknown key": ({**PLACED, "positon": 3}, "key: .*got 'positon' .did you mean 'position_xy'"),
     "key of another source": ({**PLACED, "alpha_threshold": 3}, "key: .*got 'alpha_threshold'"),
     "pivot of a shape": ({**PLACED, "pivot_xy": [0, 0]}, "key: .*got 'pivot_xy'"),

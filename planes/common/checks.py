@@ -81,7 +81,11 @@ def reals(field: str, values: object, shape: Shape, limit: float = math.inf) -> 
 
     In the shape None stands for any length; the limit is of absolute values. Errors name the field.
     """
-    array = _float64(_numeric(field, values, shape, "iuf"))
+    numbers = _numeric(field, values, shape, "iuf")
+    if numbers.dtype.kind == "O":
+        most = min(limit, FLOAT_MAX)
+        _first_bad(field, numbers, np.abs(numbers) <= most, f"a number within ±{most:.15g}")
+    array = _float64(numbers)
     if not all_within(array, -min(limit, FLOAT_MAX), min(limit, FLOAT_MAX)):
         _first_bad(field, array, np.isfinite(array), "a finite number")
         _first_bad(field, array, np.abs(array) <= limit, f"a number within ±{limit:.15g}")
@@ -92,6 +96,8 @@ def integers(field: str, values: object, shape: Shape, low: int, high: int) -> I
     """Check an array of whole numbers in [low, high]; whole floats pass."""
     array = _numeric(field, values, shape, "iuf")
     whole = f"a whole number from {low} to {high}"
+    if array.dtype.kind == "O":
+        _first_bad(field, array, (array >= low) & (array <= high), whole)
     if array.dtype.kind == "f":
         array = _float64(array)
         _first_bad(field, array, (np.rint(array) == array) & (np.abs(array) <= 2.0**53), whole)
@@ -132,10 +138,11 @@ def real(field: str, value: object, low: float, high: float) -> float:
     given = float(value) if type(value) is int and value.bit_length() < FLOAT_BITS else value
     if type(given) is float and low <= given <= high:
         return given
-    number = float(reals(field, given, ()))
+    number = given if type(given) is int else float(reals(field, given, ()))
+    low, high = max(low, -FLOAT_MAX), min(high, FLOAT_MAX)
     if not low <= number <= high:
         raise InputError(f"{field}: expected a number from {low:.15g} to {high:.15g}, got {shown(value)}")
-    return number
+    return float(number)
 
 
 def integer(field: str, value: object, low: int, high: int) -> int:
@@ -239,7 +246,7 @@ _brief.maxstring = _brief.maxother = _brief.maxlong = 2 * SHOWN
 def _numeric(field: str, values: object, shape: Shape, kinds: str) -> npt.NDArray[Any]:
     array = array_of(field, values, shape)
     empty = not array.size and array.dtype.kind == "f"  # numpy makes an empty list an array of floats
-    if array.dtype.kind not in kinds and not empty:
+    if array.dtype.kind not in kinds and not empty and not ("f" in kinds and _are_long(array)):
         kind = "booleans" if kinds.startswith("b") else "numbers" if shape else "a number"
         given = values if (array.dtype.kind in "US" and array is not values) or array.size > SHOWN else array.tolist()
         raise InputError(f"{field}: expected {kind}, got {shown(given)}")
@@ -248,6 +255,13 @@ def _numeric(field: str, values: object, shape: Shape, kinds: str) -> npt.NDArra
     if len(array.shape) != len(shape) or any(e not in (None, g) for e, g in zip(shape, array.shape, strict=True)):
         raise InputError(f"{field}: expected shape {_spelled(shape)}, got {array.shape}")
     return array
+
+
+def _are_long(array: npt.NDArray[Any]) -> bool:
+    """Whether an array holds numbers, some of more than 64 bits, which numpy keeps as Python's own."""
+    if array.dtype.kind != "O" or not all(isinstance(v, int | float) and not isinstance(v, bool) for v in array.flat):
+        return False
+    return any(abs(v) >= 2**63 for v in array.flat)
 
 
 def _plain(values: object) -> bool:
@@ -287,7 +301,8 @@ def _first_bad(field: str, array: npt.NDArray[Any], good: Bools | np.bool_, expe
     if np.all(good):
         return
     row = tuple(np.argwhere(~np.asarray(good))[0].tolist())
-    raise InputError(f"{field}{_place(row)}: expected {expected}, got {array[row]}")
+    got = shown(array[row]) if array.dtype.kind == "O" else array[row]
+    raise InputError(f"{field}{_place(row)}: expected {expected}, got {got}")
 
 
 def _place(row: Iterable[int]) -> str:
