@@ -545,6 +545,9 @@ def test_replay_says_of_all_shots_that_they_do_the_same_at_another_scene(
     first, second = capsys.readouterr().out.splitlines()
     assert first.startswith(f"{match} line 2, shot 0: scene: its content hash is ")
     assert second == "all shots do the same again"
+    with pytest.raises(SystemExit):
+        main(["replay", "--help"])
+    assert "1 a result or the content of the scene differs" in capsys.readouterr().out
 
 
 def test_replay_tells_of_a_record_without_an_end(match: Path, capsys: pytest.CaptureFixture[str]) -> None:

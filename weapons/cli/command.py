@@ -129,12 +129,13 @@ instead of compiling them in the middle of a game. hitplanes.warm_up() does the 
 
 REPLAY_HELP = """\
 Fire the shots of a record again and print how the first different result differs. A game writes a record by firing
-with hitplanes.ShotRecord. SCENE stands still: a record of shots at ticks is for hitplanes.replay and their History.
+with hitplanes.ShotRecord. If all results are the same but the content of SCENE is not, that is a difference, too. SCENE
+stands still: a record of shots at ticks is for hitplanes.replay and their History.
 
 If a line of the record was changed, lost, doubled or moved, the record is bad input, and the error names the line. If a
 record was not closed (the game crashed), its shots are fired, and a note says that some may be missing.
 
-Exit code: 0 all results are the same, 1 one differs, 2 bad input.
+Exit code: 0 no difference, 1 a result or the content of the scene differs, 2 bad input.
 """
 
 REPLAY_EXAMPLES = """\
@@ -535,7 +536,7 @@ def compare(arguments: argparse.Namespace) -> int:
 
 
 def replay(arguments: argparse.Namespace) -> int:
-    """Print the first shot of a record whose result differs; return 1 if there is one."""
+    """Print the first shot of a record whose result or scene differs; return 1 if there is one."""
     from ..replay.record import NO_END, SAME, replayed  # only this subcommand needs it
 
     found, endless = replayed(arguments.record, load_scene(arguments.scene))
