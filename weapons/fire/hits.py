@@ -309,9 +309,9 @@ class Hits:
     def to_shot(self, shot: int = 0) -> dict[str, Any]:
         """One shot as a scene file has it, for `scene.shots`: fired from there it hits the same.
 
-        Its weapon is the name of an equal one in `scene.weapons`, or the weapon as JSON. Positions are in 1/256 px, and
-        an `aim` is as it was given. Excluded owners of nothing that could be hit or block are left out. A shot of the
-        past is one of `hits.scene_of(shot).copy()`.
+        Its weapon is the name of an equal one in `scene.weapons`, or the weapon as JSON. Positions are in 1/256 px. An
+        `aim` is as it was given; one beyond 10^9 degrees, which files refuse, is its remainder by 360. Excluded owners
+        of nothing that could be hit or block are left out. A shot of the past is one of `hits.scene_of(shot).copy()`.
         """
         row = self._checked(shot)
         return late.shot_log.shot_json(self.weapon, self._one(row), *self._then(row))
