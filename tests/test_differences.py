@@ -250,6 +250,19 @@ def test_words_about_what_was_fired() -> None:
     assert kind[:2] == ['weapon "disc" is gone', 'weapon "point" is new']
 
 
+@pytest.mark.parametrize("name", [None, "gun"])
+def test_of_weapons_of_two_kinds_nothing_is_told_that_only_one_has(name: str | None) -> None:
+    scene, reports = game(), []
+    for weapon in (Disc(20), Pistol(90)):
+        scene.weapons = {} if name is None else {name: weapon.to_json()}
+        reports.append(report_of(scene, [fire(scene, weapon, (210, 110))], name and [name]))
+    key = "weapon" if name is None else "kind"
+    for was, now, words in ((*reports, '"pistol", was "disc"'), (*reports[::-1], '"disc", was "pistol"')):
+        lines = differences(was, now)
+        assert sum(line.endswith(f"{key}: {words}") for line in lines) == 1
+        assert not any("missing" in line for line in lines), lines
+
+
 def test_shots_are_paired_by_what_was_fired() -> None:
     scene = game()
     at = [(200, 100), (210, 110), (230, 120)]

@@ -33,10 +33,12 @@ def same(a: Any, b: Any) -> bool:
 
 
 def by_path(path: str, was: Any, now: Any) -> Iterator[str]:
-    """Lines about the leaves that differ, each with its path."""
+    """Lines about the leaves that differ, each with its path; of weapons of two kinds, only of keys that both have."""
     if same(was, now):
         return
     if isinstance(was, dict) and isinstance(now, dict):
+        if "kind" in was and "kind" in now and not same(was["kind"], now["kind"]):
+            was, now = _common(was, now)
         for key in dict.fromkeys([*was, *now]):
             yield from by_path(f"{path}.{key}" if path else str(key), was.get(key, ABSENT), now.get(key, ABSENT))
     elif isinstance(was, list | tuple) and isinstance(now, list | tuple) and len(was) == len(now):
@@ -280,7 +282,10 @@ def _shots(was: Entry, now: Entry) -> list[str] | None:
         if before is None or after is None:
             groups.append([f"{title} is {'missing' if after is None else 'new'}"])
         elif not same(before, after):
-            groups.append([f"{title}: {line}" for line in _shot(before, after)])
+            lines = _shot(before, after)
+            if not same(_weapon_of(was, before), _weapon_of(now, after)):
+                lines = _shot(*_common(before, after)) or lines
+            groups.append([f"{title}: {line}" for line in lines])
     lines = [line for group in groups[:LINES_MAX] for line in group]
     return lines + [f"and {len(groups) - LINES_MAX} more shots"] * (len(groups) > LINES_MAX) or None
 
@@ -292,6 +297,20 @@ def _shot(was: Entry, now: Entry) -> list[str]:
         "samples": _samples, "nearest_miss": _nearest_miss,
     }  # fmt: skip
     return _lines_of(_chief(was), _chief(now), words) or _lines_of(was, now, words)
+
+
+def _weapon_of(report: Entry, shot: Entry) -> Any:
+    """Weapon of a shot as JSON, which decides what keys the shot has; None if the report has none."""
+    weapons = report.get("weapons")
+    return weapons.get(str(shot.get("weapon"))) if isinstance(weapons, dict) else None
+
+
+def _common(was: Any, now: Any) -> tuple[Any, Any]:
+    """Both values without the keys of objects, at any depth, that only one of them has."""
+    if not (isinstance(was, dict) and isinstance(now, dict)):
+        return was, now
+    both = {key: _common(was[key], now[key]) for key in was if key in now}
+    return {key: before for key, (before, _) in both.items()}, {key: after for key, (_, after) in both.items()}
 
 
 def _chief(shot: Entry) -> dict[str, Any]:
