@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hitplanes import Beam, Disc, InputError, Laser, Point, Scene, Spread, Sprite, fire, load_scene, weapons_of
+from hitplanes import Beam, Disc, History, InputError, Laser, Point, Scene, Spread, Sprite, fire, load_scene, weapons_of
 from hitplanes import Box as WeaponBox
 from hitplanes.weapons.report.canvas import RING, World, heat_step, plain
 from hitplanes.weapons.report.cards import CELL, COLUMNS, ROWS, inset_of, shot_card
@@ -175,8 +175,15 @@ def test_the_ways_of_rays_are_lines(of_rays: bool) -> None:
 def test_hits_of_another_scene_or_version_are_refused() -> None:
     scene, other = street(), street()
     hits = fire(scene, Point(), (1, 1))
-    with pytest.raises(InputError, match=r"fired\[0\]: expected hits of the scene 'street', got those of another"):
+    with pytest.raises(InputError, match=r"fired\[0\]: expected hits of the scene 'street', got those of another$"):
         report_of(other, [hits])
+    history = History(scene, ticks=2)
+    for tick in (0, 1):
+        history.record(tick)
+    past = fire(history, Point(), (1, 1), tick=0)
+    for moment, of in ((scene, past), (history.at(1), past), (history.at(0), hits)):
+        with pytest.raises(InputError, match=r"those of another moment of it: .*, history\.at\(tick\)$"):
+            report_of(moment, [of])
     with pytest.raises(InputError, match=r"fired\[1\]: expected Hits, got int"):
         report_of(scene, [hits, 5])  # type: ignore[list-item]
     with pytest.raises(InputError, match="names: expected 1, one for each hits, got 0"):

@@ -319,7 +319,9 @@ def _checked(scene: Scene, fired: object) -> list[Hits]:
         if not hits.one_scene:
             raise InputError(f"fired[{row}]: expected shots at one tick, got several: fire them at history.at(tick)")
         if hits.scene is not scene:
-            raise InputError(f"fired[{row}]: expected hits of the scene {scene.name!r}, got those of another")
+            moment = " moment of it: pass the scene that they were fired at, history.at(tick)"
+            another = "another" + (moment if hits.scene.latest is scene.latest else "")
+            raise InputError(f"fired[{row}]: expected hits of the scene {scene.name!r}, got those of {another}")
         if hits.version != scene.version:
             got = f"version {hits.version}: {BEFORE}"
             raise InputError(f"fired[{row}]: expected {scene.name!r} at version {scene.version}, got {got}")
