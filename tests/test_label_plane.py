@@ -201,7 +201,7 @@ def test_a_plane_that_lags_behind_the_journal_is_drawn_anew(asked: bool, monkeyp
 
 
 def test_masks_that_are_laid_out_anew_are_read_from_there(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Many forms that nothing uses any more; a stack that was handed out keeps its masks."""
+    """Many masks that nothing uses any more; a stack that was handed out keeps its masks."""
     monkeypatch.setattr("hitplanes.planes.scene.variants.ATLAS_SLACK_BYTES", 100)
     scene = random_scene(np.random.default_rng(2), 5)
     plane = LabelPlane(BOUNDS)

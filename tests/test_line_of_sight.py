@@ -246,17 +246,21 @@ def test_a_start_in_an_occluder() -> None:
 
 @pytest.mark.usefixtures("jit")
 @pytest.mark.parametrize("strategy", WAYS)
-def test_shots_that_begin_in_walls_of_few_and_of_many_rectangles(strategy: str) -> None:
-    """Together they hit what each hits alone."""
-    comb, broken = np.zeros((2, 10), np.bool_), np.array([[1, 1, 0, 0, 1]], np.bool_)
+@pytest.mark.parametrize("samples", [2**18, 50])
+def test_shots_that_begin_in_walls_of_three_and_of_four_rectangles(
+    monkeypatch: pytest.MonkeyPatch, strategy: str, samples: int
+) -> None:
+    """Together they hit what each hits alone, however many samples are looked at together."""
+    comb, broken = np.zeros((2, 8), np.bool_), np.array([[1, 1, 0, 0, 1, 0, 1]], np.bool_)
     comb[0], comb[1, 2::2] = True, True
     scene = Scene()
     for wall, x in ((comb, -1000), (broken, 0)):
         scene.add(Sprite.from_mask(wall, pivot_xy=(0, 0)), (x, 0), role="occluder")
         scene.add(Sprite.from_mask(np.ones((3, 9), np.bool_), pivot_xy=(0, 0)), (x + 2, 0))
     weapon = Disc(9, line_of_sight="occluders", inside="ignore_until_exit")
-    hits = fire(scene, weapon, [(-1000, 0), (1, 0)], strategy=strategy)
     alone = [fire(scene, weapon, at, strategy="spans")[0] for at in ((-1000, 0), (1, 0))]
+    monkeypatch.setattr(shadows, "CHUNK_SAMPLES", samples)
+    hits = fire(scene, weapon, [(-1000, 0), (1, 0)], strategy=strategy)
     assert [row.pixels for row in hits] == [row.pixels for row in alone]
 
 

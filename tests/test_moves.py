@@ -125,7 +125,7 @@ def sides(stack: Stack) -> tuple[list[int], list[int]]:
     return box[:, :2].ravel().tolist(), box[:, 2:].ravel().tolist()
 
 
-def test_moves_keep_the_number_of_the_forms_and_share_all_but_the_boxes() -> None:
+def test_moves_keep_the_arrangement_and_share_all_but_the_boxes() -> None:
     scene = random_scene(np.random.default_rng(1), 20)
     first = scene.items.stack()
     assert first.rank_by_label is first.rank_by_label and not first.rank_by_label.flags.writeable

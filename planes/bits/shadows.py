@@ -9,7 +9,7 @@ item shelters p if one of its pixels lies on the way:
 A mask is covered by rectangles. The pixels of a row behind a rectangle form one interval, whose ends are quotients of
 whole numbers: the segment from (0, 0) to (x, y) meets a box if it is not separated from it by a side of the box or by
 its own line. The item's own pixels hide those behind them; the bare ones, which nothing of the rectangle lies before,
-are told apart. `jit.bit_rows` has the compiled form of `hide_behind`.
+are told apart. `jit.bit_rows` has the compiled forms of `hide_behind` and `left_and_met`.
 
 References
 ----------
@@ -243,46 +243,41 @@ def hide_after_exit(
     place, rects = blockers.rects_of(blocker[near], origin[near])
     begun = sorted_once(place[_holds_origin(rects)])
     own, first = pair[near[begun]], place.searchsorted(begun)
-    last = place.searchsorted(begun, side="right") - 1
-    most = int((last - first).max(initial=0)) + 1
-    for part in pieces(most * np.bitwise_count(rows[own]).sum(axis=1, dtype=np.int64), CHUNK_SAMPLES):
-        row, number = own[part], first[part, None] + np.arange(most)
-        k, bit, column = _pixels_of(rows[row])
-        x, y = np.stack([column, bit]) + (corner_xy - origin_xy)[row[k]].T
-        of_pair = np.append(rects, NO_RECT, axis=0)[np.where(number <= last[part, None], number, -1)]
-        again = kernels_of(sys.modules[__name__]).left_and_met(of_pair, k, x, y)
-        k, bit, column = k[again], bit[again], column[again]
-        of_pair = rects[np.minimum(number, last[part, None])]  # some are there twice
-        hidden = _times(of_pair[k].swapaxes(0, 1), x[again], y[again], True)[0].any(axis=0)
-        np.bitwise_and.at(rows, (row[k[hidden]], bit[hidden]), ~(np.uint64(1) << column[hidden].astype(np.uint64)))
+    count = place.searchsorted(begun, side="right") - first
+    about = np.ceil(np.log2(count))
+    for size in np.unique(about).tolist():  # blockers of about as many rectangles are looked at together
+        alike = np.flatnonzero(about == size)
+        for part in pieces(np.full(len(alike), rows.shape[1] * WORD), CHUNK_SAMPLES):
+            now = alike[part]
+            _clear_after_exit(rows, corner_xy - origin_xy, own[now], rects, first[now], count[now])
     apart = np.ones(len(pair), np.bool_)
     apart[near[begun]] = False
     return pair[apart], blocker[apart]
 
 
-def left_and_met(rects: Ints, k: Ints, x: Ints, y: Ints) -> Ints:
-    """Pixels (s,) on the way to which from pixel (0, 0) an item is left and met again.
-
-    The rectangles of an item share no pixel. So a way that has not left it is as long as its parts in them together.
+def _clear_after_exit(rows: Words, corner_xy: Ints, own: Ints, rects: Ints, first: Ints, count: Ints) -> None:
+    """Clear the pixels of rows `own` that a blocker of each shelters once the way from (0, 0) has left it.
 
     Parameters
     ----------
-    rects : (B, m, 4) of each item, of which one holds pixel (0, 0)
-    k : (s,) item of each pixel
+    corner_xy : (n, 2) pixel of bit 0 of the first row
+    first, count : (k,) the rectangles of the blockers
     """
-    across, down = np.maximum(np.abs(x), 1), np.maximum(np.abs(y), 1)
-    low, high = 2 * np.moveaxis(rects, 2, 0)[:2] - 1, 2 * np.moveaxis(rects, 2, 0)[2:] + 1  # in halves of a pixel
-    end = 2 * across * down
-    entry, leave = 0, end[:, None]
-    for axis, (step, scale) in enumerate(((x, down), (y, across))):
-        factor = (np.sign(step) * scale)[:, None]
-        near, far = low[axis].take(k, axis=0) * factor, high[axis].take(k, axis=0) * factor
-        back, level = step < 0, step == 0
-        near[back], far[back] = far[back], near[back]
-        far[level] = np.where((low[axis][k[level]] <= 0) & (high[axis][k[level]] >= 0), end[level, None], -1)
-        entry, leave = np.maximum(near, entry), np.minimum(far, leave)
-    inside = np.maximum(leave - entry, 0).sum(axis=1)
-    return np.flatnonzero(inside < np.where(entry <= leave, leave, 0).max(axis=1))
+    pair, bit, column = _pixels_of(rows[own])
+    x, y = np.stack([column, bit]) + corner_xy[own[pair]].T
+    place, every = np.arange(count.max(initial=0)), np.append(rects, NO_RECT, axis=0)
+    for begin in range(0, len(pair), max(CHUNK_SAMPLES // len(place), 1)):
+        now = slice(begin, begin + max(CHUNK_SAMPLES // len(place), 1))
+        here, which = np.unique(pair[now], return_inverse=True)
+        number, there = first[here, None] + place, place < count[here, None]
+        again = kernels_of(sys.modules[__name__]).left_and_met(
+            every[np.where(there, number, -1)], which, x[now], y[now]
+        )
+        of_pair = every[np.where(there, number, first[here, None])][which[again]]  # the first is there several times
+        again += begin
+        hidden = again[_times(of_pair.swapaxes(0, 1), x[again], y[again], True)[0].any(axis=0)]
+        pixels = ~(np.uint64(1) << column[hidden].astype(np.uint64))
+        np.bitwise_and.at(rows, (own[pair[hidden]], bit[hidden]), pixels)
 
 
 def _pixels_of(rows: Words) -> tuple[Ints, Ints, Ints]:
@@ -290,6 +285,32 @@ def _pixels_of(rows: Words) -> tuple[Ints, Ints, Ints]:
     octets = np.ascontiguousarray(rows, "<u8").view(np.uint8)
     number, row, column = np.unpackbits(octets, axis=1, bitorder="little").reshape(*rows.shape, WORD).nonzero()
     return number, row, column
+
+
+def left_and_met(rects: Ints, item: Ints, x: Ints, y: Ints) -> Ints:
+    """Pixels (s,) on the way to which from pixel (0, 0) an item is left and met again.
+
+    The rectangles of an item share no pixel, so the parts of the way in them do not overlap. If they are shorter in sum
+    than the way up to the last exit, there is a gap.
+
+    Parameters
+    ----------
+    rects : (B, m, 4) of each item, of which one holds pixel (0, 0)
+    item : (s,) item of each pixel
+    """
+    across, down = np.maximum(np.abs(x), 1), np.maximum(np.abs(y), 1)
+    low, high = 2 * np.moveaxis(rects, 2, 0)[:2] - 1, 2 * np.moveaxis(rects, 2, 0)[2:] + 1  # in halves of a pixel
+    end = 2 * across * down
+    entry, leave = 0, end[:, None]
+    for axis, (step, scale) in enumerate(((x, down), (y, across))):
+        factor = (np.sign(step) * scale)[:, None]
+        near, far = low[axis].take(item, axis=0) * factor, high[axis].take(item, axis=0) * factor
+        back, level = step < 0, step == 0
+        near[back], far[back] = far[back], near[back]
+        far[level] = np.where((low[axis][item[level]] <= 0) & (high[axis][item[level]] >= 0), end[level, None], -1)
+        entry, leave = np.maximum(near, entry), np.minimum(far, leave)
+    inside = np.maximum(leave - entry, 0).sum(axis=1)
+    return np.flatnonzero(inside < np.where(entry <= leave, leave, 0).max(axis=1))
 
 
 def _between(rects: Ints, boxes_xyxy: Ints) -> Bools:

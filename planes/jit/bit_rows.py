@@ -263,10 +263,10 @@ def _left_and_met(rects, item, x, y, again):
     return count
 
 
-def left_and_met(rects: Ints, k: Ints, x: Ints, y: Ints) -> Ints:
+def left_and_met(rects: Ints, item: Ints, x: Ints, y: Ints) -> Ints:
     """See `bits.shadows.left_and_met`."""
     again = np.empty(len(x), np.int64)
-    return again[: _left_and_met(rects, k, x, y, again)]
+    return again[: _left_and_met(rects, item, x, y, again)]
 
 
 def hide_behind(

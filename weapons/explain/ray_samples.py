@@ -264,11 +264,13 @@ def ray_why_not(detail: RayDetail, hit: Set[int]) -> list[WhyNot]:
     touched = np.bincount(met.rank, met.count, len(stack)).astype(np.int64)
     box, bounds = stack.box_xyxy, detail.bounds
     cut = np.zeros(len(stack), np.bool_) if bounds is None else (clipped(box, bounds) != box).any(axis=1)
-    outside = {rank for rank in objects if cut[rank] and not len(pixels_in(stack, rank, bounds))}
-    beside = [rank for rank in objects if not touched[rank] and rank not in outside]
-    near = {rank: gap[0] for rank, gap in _gaps(detail, beside, bounds, NEAR_PX).items()}
-    near |= {rank: gap[0] for rank, gap in _gaps(detail, sorted(outside), None, NEAR_PX).items()}
+    beside = [rank for rank in objects if not touched[rank]]
+    near = {rank: gap[0] for rank, gap in _gaps(detail, beside, None, NEAR_PX).items()}
     near |= {rank: 0.0 for rank in objects if touched[rank]}
+    outside = {rank for rank in near if cut[rank] and not len(pixels_in(stack, rank, bounds))}
+    partly = {rank for rank in near if cut[rank] and not touched[rank]} - outside
+    near = {rank: distance for rank, distance in near.items() if rank not in partly}
+    near |= {rank: gap[0] for rank, gap in _gaps(detail, sorted(partly), bounds, NEAR_PX).items()}
     found = [_why(detail, rank, int(touched[rank]), distance, rank in outside) for rank, distance in near.items()]
     return sorted(found, key=lambda w: (w.distance, w.object))
 

@@ -199,7 +199,7 @@ class OneShot(Hits, list[HitRow]):
         candidates = Candidates(present.scene.items, present.stack)
         pierce = parts_of(present.weapon)[2].pierce
         context = QueryContext(present.stack, present.bounds, pierce, candidates, self.plan, None)
-        return placements, late.spans.direct(placements, self.shots, context, counted=True)
+        return placements, late.spans.direct(placements, self.shots, context)
 
     def _counted(self) -> Ints:
         return np.asarray(self._met[1].counts.reshape(1, -1, len(OF_PATTERNS)).sum(axis=1))

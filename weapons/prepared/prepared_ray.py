@@ -56,8 +56,8 @@ def ray_along(start: tuple[int, int], step: tuple[int, int]) -> Rays:
 def _first_end(rays: Rays, met: list[list[int]]) -> Terminations:
     """The end of one ray in the object that it hits, or at its range; `met` is that of `Followed`."""
     ends = endless(1)
-    for rank, _, x, y, entry in met:
-        left, top = rays.origin_xy[0].tolist()
+    if met:
+        (rank, _, x, y, entry), (left, top) = met[0], rays.origin_xy[0].tolist()
         ends.reason[0], ends.rank[0], ends.time[0] = Reason.HITS, rank, entry
         ends.x[0], ends.y[0] = x - left, y - top
     return ends
