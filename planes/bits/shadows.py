@@ -265,15 +265,15 @@ def _clear_after_exit(rows: Words, corner_xy: Ints, own: Ints, rects: Ints, firs
     """
     pair, bit, column = _pixels_of(rows[own])
     x, y = np.stack([column, bit]) + corner_xy[own[pair]].T
-    place, every = np.arange(count.max(initial=0)), np.append(rects, NO_RECT, axis=0)
-    for begin in range(0, len(pair), max(CHUNK_SAMPLES // len(place), 1)):
-        now = slice(begin, begin + max(CHUNK_SAMPLES // len(place), 1))
+    place, every = np.arange(count.max()), np.append(rects, NO_RECT, axis=0)
+    step = max(CHUNK_SAMPLES // len(place), 1)
+    for begin in range(0, len(pair), step):
+        now = slice(begin, begin + step)
         here, which = np.unique(pair[now], return_inverse=True)
         number, there = first[here, None] + place, place < count[here, None]
-        again = kernels_of(sys.modules[__name__]).left_and_met(
-            every[np.where(there, number, -1)], which, x[now], y[now]
-        )
-        of_pair = every[np.where(there, number, first[here, None])][which[again]]  # the first is there several times
+        of_pair = every[np.where(there, number, -1)]
+        again = kernels_of(sys.modules[__name__]).left_and_met(of_pair, which, x[now], y[now])
+        of_pair = every[np.where(there, number, first[here, None])][which[again]]  # filled up with the first of each
         again += begin
         hidden = again[_times(of_pair.swapaxes(0, 1), x[again], y[again], True)[0].any(axis=0)]
         pixels = ~(np.uint64(1) << column[hidden].astype(np.uint64))
