@@ -107,9 +107,8 @@ def test_volumes_and_cells_are_drawn_and_in_the_legend(prefilter: str | None, br
 
 def test_the_footer_leaves_out_nothing_that_is_drawn() -> None:
     """The call itself needed no volume: what is drawn is what a call that asks for them would test."""
-    scene = yard()
     plain, drawn = (
-        _footer(report(scene, Disc(20), (90, 60), **how), 2000, 100)[1].text.split("left out: ")[1]
+        _footer(report(yard(), Disc(20), (90, 60), **how), 2000, 100)[1].text.split("left out: ")[1]
         for how in ({}, {"prefilter": "4 boxes", "broadphase": "quadtree"})
     )
     assert "broad phase" in plain and "volumes" in plain and "weights" in drawn
