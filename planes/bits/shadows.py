@@ -244,8 +244,8 @@ def hide_after_exit(
     begun = sorted_once(place[_holds_origin(rects)])
     own, first = pair[near[begun]], place.searchsorted(begun)
     count = place.searchsorted(begun, side="right") - first
-    about = np.ceil(np.log2(count))
-    for size in np.unique(about).tolist():  # blockers of about as many rectangles are looked at together
+    about = np.ceil(np.log2(count)).astype(np.int64)
+    for size in sorted_once(about).tolist():  # blockers of about as many rectangles are looked at together
         alike = np.flatnonzero(about == size)
         for part in pieces(np.full(len(alike), rows.shape[1] * WORD), CHUNK_SAMPLES):
             now = alike[part]
@@ -269,13 +269,13 @@ def _clear_after_exit(rows: Words, corner_xy: Ints, own: Ints, rects: Ints, firs
     step = max(CHUNK_SAMPLES // len(place), 1)
     for begin in range(0, len(pair), step):
         now = slice(begin, begin + step)
-        here, which = np.unique(pair[now], return_inverse=True)
-        number, there = first[here, None] + place, place < count[here, None]
-        of_pair = every[np.where(there, number, -1)]
+        new = begins(pair[now])
+        here, which = pair[now][new], np.cumsum(new) - 1
+        of_pair = every[np.where(place < count[here, None], first[here, None] + place, -1)]
         again = kernels_of(sys.modules[__name__]).left_and_met(of_pair, which, x[now], y[now])
-        of_pair = every[np.where(there, number, first[here, None])][which[again]]  # filled up with the first of each
+        of_pixel = of_pair[which[again]].swapaxes(0, 1)
         again += begin
-        hidden = again[_times(of_pair.swapaxes(0, 1), x[again], y[again], True)[0].any(axis=0)]
+        hidden = again[_times(of_pixel, x[again], y[again], True)[0].any(axis=0)]
         pixels = ~(np.uint64(1) << column[hidden].astype(np.uint64))
         np.bitwise_and.at(rows, (own[pair[hidden]], bit[hidden]), pixels)
 

@@ -278,7 +278,6 @@ def hide_behind(
     bounds = EVERYWHERE if blockers.bounds is None else blockers.bounds
     boxes = np.ascontiguousarray(blockers.box_xyxy)
     _hide_behind(rows, corner_xy, origin_xy, boxes, blockers.begin, blockers.rects, bounds, pair, blocker)
-    return None
 
 
 @helper()
