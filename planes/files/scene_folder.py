@@ -229,17 +229,16 @@ def _object(entry: object, folder: Path, sprites: dict[str, Sprite]) -> dict[str
     """Check an object, and replace what makes its sprite by that; `sprites` has those of earlier objects."""
     if not isinstance(entry, dict):
         raise InputError(f"expected an object, got {shown(entry)}")
-    given = entry
-    kinds = [key for key in SOURCES if key in given]
+    kinds = [key for key in SOURCES if key in entry]
     if len(kinds) != 1:
-        unknown = [key for key in given if not kinds and not any(key in keys.forms for keys in OBJECT.values())]
+        unknown = [key for key in entry if not kinds and not any(key in keys.forms for keys in OBJECT.values())]
         hint = next(filter(None, (suggestion(key, SOURCES) for key in unknown)), "")
         got = " and ".join(kinds or unknown) or "none"
         raise InputError(f"source: expected one of {', '.join(SOURCES)}, got {got}{hint}")
     kind = kinds[0]
-    data = OBJECT[kind].check("object", given)
+    data = OBJECT[kind].check("object", entry)
     made_of = {key: data.pop(key) for key in SOURCES[kind] if key in data}
-    source = {key: given[key] for key in made_of}
+    source = {key: entry[key] for key in made_of}
     shared = json.dumps(source, sort_keys=True)
     if shared not in sprites:
         carvings = made_of.pop("carved", ())

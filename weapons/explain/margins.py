@@ -113,7 +113,7 @@ def ray_margins(scene: Scene, parts: Parts, shot: Shots, number: int) -> list[Ma
     rays = rays_each(parts)
     if rays > RAYS_MAX:
         raise InputError(f"shot: expected one of at most {RAYS_MAX} rays, got {rays}")
-    stack, shifts = scene.items.stack(), RAY_SHIFTS if rays <= FINE_RAYS else PATTERN_SHIFTS / 1
+    stack, shifts = scene.items.stack(), RAY_SHIFTS if rays <= FINE_RAYS else PATTERN_SHIFTS.astype(np.float64)
     if not len(stack):
         return []
     if ray.inside == "error":

@@ -326,7 +326,7 @@ def _gaps(detail: RayDetail, objects: list[int], bounds: Box | None, most: float
     end = begin + detail.ends.fraction[:, None] * (rays.step_256 / SUB)
     wide = detail.lines.radius / SUB
     if bounds is not None:
-        objects = [rank for rank in objects if meets(np.array(bounds), stack.box_xyxy[rank])]
+        objects = np.array(objects, np.int64)[meets(np.array(bounds), stack.box_xyxy[objects])].tolist()
     boxes_xyxy = stack.box_xyxy[objects] if bounds is None else clipped(stack.box_xyxy[objects], bounds)
     boxes = squares(boxes_xyxy, origin)
     least = np.full(len(objects), np.inf)

@@ -361,7 +361,7 @@ def check_owners(scene: Scene, owners: Ints | tuple[int, ...], exclude: object) 
     whole = [owner for owner in last if owner not in parts and items.name_of(owner)]
     near = ", ".join(f"{owner} {items.name_of(owner)!r}" for owner in whole[-OWNERS_NAMED:])
     known = f"the nearest are {near}" if near else "it never had any"
-    alone = every.size == 1 or np.ndim(exclude) == 0  # type: ignore[arg-type]
-    place = "" if alone else f"[{row + column}]" if np.ndim(exclude) == 1 else f"[{row}][{column}]"  # type: ignore[arg-type]
+    dimensions = 0 if every.size == 1 else np.ndim(exclude)  # type: ignore[arg-type]
+    place = ("", f"[{row + column}]", f"[{row}][{column}]")[dimensions]
     got = every[row, column]
     raise InputError(f"exclude{place}: expected an owner that the scene has or had, got {got}; {known}")

@@ -60,7 +60,7 @@ HASH = np.array([73_856_093, 19_349_663, 83_492_791], np.uint64)
 Plane = npt.NDArray[Any]
 
 Row = list[tuple[str, str]]  # caption and file of pictures that are shown side by side
-TEXTLESS = " (goldens have no text)"
+SIDE_BY_SIDE, TEXTLESS = "hits: expected, got, difference", " (goldens have no text)"
 
 
 def pictures_of(changed: Unlike) -> list[str]:
@@ -76,19 +76,18 @@ def draw_difference(folder: Path, expected: Golden | None, got: Golden, changed:
         assert got.whole is not None and got.scene is not None  # golden_of has made it
         picture = picture_of_report(got.whole, got.scene, text=False)
     write_png(folder / "got.png", picture)
+    rows: list[Row] = []
     if expected is None or expected.picture is None or got.picture is None:
         pair = [] if expected is None or got.whole is None else reports_of_hits(got.whole, expected.report, got.report)
         if pair and changed.hits:
             write_png(folder / COMPARED, picture_of_difference(pair[0], pair[1], (got.scene, got.scene)))
-        return [[("hits: expected, got, difference", COMPARED)]] * bool(pair and changed.hits) + [
-            [(f"got{TEXTLESS}", "got.png")]
-        ]
+            rows += [[(SIDE_BY_SIDE, COMPARED)]]
+        return [*rows, [(f"got{TEXTLESS}", "got.png")]]
     write_png(folder / "expected.png", expected.picture)
-    rows: list[Row] = []
     if changed.hits:
         scenes = scene_of(expected), got.scene
         write_png(folder / COMPARED, picture_of_difference(expected.report, got.report, scenes))
-        rows += [[("hits: expected, got, difference", COMPARED)]]
+        rows += [[(SIDE_BY_SIDE, COMPARED)]]
     rows += [[(f"expected{TEXTLESS}", "expected.png"), (f"got{TEXTLESS}", "got.png")]]
     if changed.picture:
         was, now = opaque(expected.picture), opaque(got.picture)
