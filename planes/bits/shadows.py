@@ -298,19 +298,26 @@ def left_and_met(rects: Ints, item: Ints, x: Ints, y: Ints) -> Ints:
     rects : (B, m, 4) of each item, of which one holds pixel (0, 0)
     item : (s,) item of each pixel
     """
-    across, down = np.maximum(np.abs(x), 1), np.maximum(np.abs(y), 1)
-    low, high = 2 * np.moveaxis(rects, 2, 0)[:2] - 1, 2 * np.moveaxis(rects, 2, 0)[2:] + 1  # in halves of a pixel
-    end = 2 * across * down
-    entry, leave = 0, end[:, None]
-    for axis, (step, scale) in enumerate(((x, down), (y, across))):
-        factor = (np.sign(step) * scale)[:, None]
-        near, far = low[axis].take(item, axis=0) * factor, high[axis].take(item, axis=0) * factor
-        back, level = step < 0, step == 0
-        near[back], far[back] = far[back], near[back]
-        far[level] = np.where((low[axis][item[level]] <= 0) & (high[axis][item[level]] >= 0), end[level, None], -1)
-        entry, leave = np.maximum(near, entry), np.minimum(far, leave)
+    entry, leave = _spells(rects[item], x[:, None], y[:, None])
     inside = np.maximum(leave - entry, 0).sum(axis=1)
     return np.flatnonzero(inside < np.where(entry <= leave, leave, 0).max(axis=1))
+
+
+def _spells(rects: Ints, x: Ints, y: Ints) -> tuple[Ints, Ints]:
+    """When the ways from pixel (0, 0) to pixels (...) enter and leave rectangles (..., 4); all broadcast.
+
+    Times are in units of 1 / (2 max(1, abs(x)) max(1, abs(y))) of the way. One that is not met is left before it is
+    entered.
+    """
+    across, down = np.maximum(np.abs(x), 1), np.maximum(np.abs(y), 1)
+    entry, leave = np.zeros(1, np.int64), 2 * across * down
+    for axis, (step, scale) in enumerate(((x, down), (y, across))):
+        low, high = 2 * rects[..., axis] - 1, 2 * rects[..., axis + 2] + 1  # in halves of a pixel
+        near, far = np.where(step > 0, low, -high) * scale, np.where(step > 0, high, -low) * scale
+        beside = (low > 0) | (high < 0)
+        entry = np.where(step == 0, entry, np.maximum(entry, near))
+        leave = np.where(step == 0, np.where(beside, -1, leave), np.minimum(leave, far))
+    return entry, leave
 
 
 def _between(rects: Ints, boxes_xyxy: Ints) -> Bools:
@@ -458,13 +465,7 @@ def _times(rects: Ints, x: Ints, y: Ints, until_exit: bool) -> tuple[Bools, Ints
     first, last, bare_first, bare_last = shadow(rects, y)
     met = (first <= x) & (x <= last)
     hidden = met & ~((bare_first <= x) & (x <= bare_last))
-    across, down = np.maximum(np.abs(x), 1), np.maximum(np.abs(y), 1)
-    entry, leave = np.zeros_like(met, np.int64), np.broadcast_to(2 * across * down, met.shape)
-    for axis, (step, scale) in enumerate(((x, down), (y, across))):
-        low, high = 2 * rects[..., axis] - 1, 2 * rects[..., axis + 2] + 1
-        near, far = np.where(step > 0, low, -high) * scale, np.where(step > 0, high, -low) * scale
-        entry = np.where(step == 0, entry, np.maximum(entry, near))
-        leave = np.where(step == 0, leave, np.minimum(leave, far))
+    entry, leave = _spells(rects, x, y)
     if until_exit and len(x):
         hidden &= entry > _exit_of(np.where(met, entry, NEVER), np.where(met, leave, -1))
     return hidden, entry
