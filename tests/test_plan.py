@@ -147,7 +147,6 @@ OF_RAYS = [
     (contacts, "end_at_hits", "stops", 10**9),
     (RAYFIRE, "Walk", "passes", 10**10),
     (RAYFIRE, "rows_of_passes", "rows", 10**11),
-    (RAYFIRE, "pixels_of", "rows", 2 * 10**11),
 ]
 GOES_ON = Rifle(60, max_hits=2)
 """A weapon whose rays are followed without all their cells, many at a time."""
@@ -161,7 +160,6 @@ OF_CAST = [
     (raycast, "_firsts", "cast", 10**5),
     (raycast, "end_at_occluders", "cast", 10**6),
     (raycast, "end_at_hits", "cast", 10**7),
-    (RAYFIRE, "pixels_of", "rows", 10**8),
     (RAYFIRE, "rows_of_passes", "rows", 10**9),
 ]
 OF_MARCH = [

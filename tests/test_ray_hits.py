@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import math
+import pickle
 import random
 from collections import Counter
 from collections.abc import Collection
@@ -106,6 +108,23 @@ def test_passes_are_made_when_they_are_read_also_if_the_scene_has_changed() -> N
     scene.remove(ids)
     assert hits.passes.object.tolist() == ids and hits.passes.material.tolist() == [5, 5, 5]
     assert hits.stop.reason.tolist() == [0]
+
+
+@pytest.mark.parametrize("weapon", [Sweep(Laser(40), 6, 3), Sweep(Pistol(40), 2, 3)])
+def test_pixels_of_several_rays_are_counted_when_they_are_read_also_if_the_scene_has_changed(weapon: Weapon) -> None:
+    scene = Scene()
+    ids = [scene.add(np.ones((9, 5), np.bool_), (10 * i, 0)) for i in range(1, 4)]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("hitplanes.weapons.rays.ray_hits.numbered", lambda *_: pytest.fail("nobody has asked"))
+        hits = fire(scene, weapon, (0, 0))
+        again = fire(scene, weapon, [(0, 0), (0, 1)])
+        assert hits.pellets.tolist() == [3] * len(hits) and hits.samples.min() > 1
+    drawn = {item: pixels.count for (_, item), pixels in hits.pixels_at().items()}
+    copies = [pickle.loads(pickle.dumps(hits)), copy.deepcopy(again)]
+    scene.remove(ids)
+    assert dict(zip(hits.object.tolist(), hits.pixels.tolist(), strict=True)) == drawn
+    assert hits.pixels[0] < hits.samples[0] and again.pixels[: len(hits)].tolist() == hits.pixels.tolist()
+    assert [copied.pixels.tolist() for copied in copies] == [hits.pixels.tolist(), again.pixels.tolist()]
 
 
 @pytest.mark.parametrize("rays", [1, 4, 128])

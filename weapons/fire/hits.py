@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import groupby
 from operator import index
 from types import MappingProxyType
@@ -56,8 +57,10 @@ class HitRow(NamedTuple):
 class Rows(ShotColumns):
     """Columns of rows, ordered by (shot, round, distance2, first y, first x, place in the stack).
 
-    A column that is not given is made by DEFAULTS when it is read.
+    A column that is not given is made by DEFAULTS when it is read; `distinct` then counts `pixels`, if it is given.
     """
+
+    __slots__ = ("_distinct",)
 
     round: Ints
     object: Ints
@@ -68,8 +71,9 @@ class Rows(ShotColumns):
     first_xy: Ints
     distance2: Ints
 
-    def __init__(self, *columns: Ints | None, **named: Ints | None) -> None:
+    def __init__(self, *columns: Ints | None, distinct: Callable[[], Ints] | None = None, **named: Any) -> None:
         """Columns in the order of a `HitRow`, or by their names; those of DEFAULTS may be missing, or None."""
+        object.__setattr__(self, "_distinct", distinct)
         given = dict(zip(HitRow._fields[: len(columns)], columns, strict=True)) | named
         vars(self).update({name: column for name, column in given.items() if column is not None})
 
@@ -85,13 +89,20 @@ class Rows(ShotColumns):
         """Bytes of the columns that were given or made."""
         return 8 * len(self.shot) * (len(vars(self)) + 1)  # `first_xy` has two numbers a row
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return partial(Rows, **self._counted()), ()
+
+    def _counted(self) -> dict[str, Any]:
+        """Columns by their names, without those that DEFAULTS make of others."""
+        return vars(self) if self._distinct is None else {**vars(self), "pixels": self.pixels}
+
     def take(self, rows: Ints | Bools | slice) -> Rows:
         """Some of the rows."""
-        return Rows(**{name: column[rows] for name, column in vars(self).items()})
+        return Rows(**{name: column[rows] for name, column in self._counted().items()})
 
     def later(self, shots: int) -> Rows:
         """The same rows, with `shots` added to each shot number."""
-        return Rows(**vars(self) | {"shot": self.shot + shots}) if shots else self
+        return Rows(**vars(self) | {"shot": self.shot + shots}, distinct=self._distinct) if shots else self
 
     @classmethod
     def joined(cls, parts: Sequence[Rows]) -> Rows:
@@ -99,8 +110,9 @@ class Rows(ShotColumns):
         if len(parts) == 1:
             return parts[0]
         given = [name for name in HitRow._fields if any(name in vars(part) for part in parts)]
-        columns = {name: np.concatenate([getattr(part, name) for part in parts]) for name in given}
-        return cls(**columns) if parts else cls.none()
+        columns = {name: _joined(parts, name) for name in given}
+        distinct = partial(_joined, parts, "pixels") if any(part._distinct for part in parts) else None
+        return cls(**columns, distinct=distinct) if parts else cls.none()
 
     @classmethod
     def none(cls) -> Rows:
@@ -109,10 +121,15 @@ class Rows(ShotColumns):
         return cls(shot=none, object=none, first_xy=np.zeros((0, 2), np.int64))
 
 
+def _joined(parts: Sequence[Rows], name: str) -> Ints:
+    """A column of several parts, one after another."""
+    return np.concatenate([getattr(part, name) for part in parts])
+
+
 DEFAULTS: dict[str, Callable[[Rows], Ints]] = {
     "round": lambda rows: ZEROS[: len(rows)],
     "samples": lambda rows: ONES[: len(rows)],
-    "pixels": lambda rows: rows.samples,
+    "pixels": lambda rows: rows.samples if rows._distinct is None else rows._distinct(),
     "weight": lambda rows: rows.samples * WEIGHT_FULL,
     "pellets": lambda rows: ONES[: len(rows)],
     "distance2": lambda rows: ZEROS[: len(rows)],

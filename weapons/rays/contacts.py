@@ -23,15 +23,15 @@ import numpy.typing as npt
 from hitplanes.planes.common.backend import kernels_of
 from hitplanes.planes.common.checks import Bools, Floats, Ints
 from hitplanes.planes.common.limits import CHUNK_SAMPLES, SUB
-from hitplanes.planes.grid.fixed_point import muldiv, pixel, scaled, snap, turned, unit
+from hitplanes.planes.grid import fixed_point
+from hitplanes.planes.grid.fixed_point import muldiv, pixel, scaled, snap
 from hitplanes.planes.grid.rasterize import COMMON, ROOM, Lines
 from hitplanes.planes.grid.spans import Box, Columns, begins, clipped, merged_runs, pieces, ragged
 from hitplanes.planes.scene.items import Items, Stack
 
-from .. import late
 from ..fire.plan import Plan
 from ..kinds.areas import Rounds, Spread
-from ..kinds.placements import ZEROS, Shots, recoiled
+from ..kinds.placements import ZEROS, Shots, pellets_of, recoiled
 from ..kinds.rays import Projectile, RayWeapon, Sweep, is_moving
 
 
@@ -72,34 +72,34 @@ def rays_of(parts: Parts, shots: Shots) -> Rays:
     """Make the ray of every pellet of every round of every shot; `parts` are the weapon's."""
     burst, several, _ = parts
     rounds, pellets = burst.count if burst else 1, several.count if several else 1
-    shot = np.arange(len(shots)).repeat(rounds * pellets)
-    one = rounds * pellets == 1
-    round_ = ZEROS[: len(shots)] if one else np.tile(np.repeat(np.arange(rounds), pellets), len(shots))
-    pellet = ZEROS[: len(shots)] if one else np.tile(np.arange(pellets), len(shots) * rounds)
-    start, origin_xy = (shots.at_256, shots.xy) if one else (shots.at_256[shot], shots.xy[shot])
+    shot, start, origin_xy = np.arange(len(shots)), shots.at_256, shots.xy
+    round_ = ZEROS[: len(shots)]
     if burst:
-        start = start + round_[:, None] * snap(burst.recoil_xy)
+        shot, round_ = shot.repeat(rounds), np.tile(np.arange(rounds), len(shots))
+        start = start[shot] + round_[:, None] * snap(burst.recoil_xy)
         origin_xy = pixel(start)
-    return Rays(start, _steps(parts, shots, shot, round_, pellet), origin_xy, shot, round_, pellet)
+    step, pellet = _steps(parts, shots, shot, round_), ZEROS[: len(shot)]
+    if several:
+        pellet = np.arange(len(shot) * pellets) % pellets
+        start, origin_xy, shot, round_ = (c.repeat(pellets, axis=0) for c in (start, origin_xy, shot, round_))
+    return Rays(start, step, origin_xy, shot, round_, pellet)
 
 
-def _steps(parts: Parts, shots: Shots, shot: Ints, round_: Ints, pellet: Ints) -> Ints:
-    """Vectors from the start of each ray to its end."""
+def _steps(parts: Parts, shots: Shots, shot: Ints, round_: Ints) -> Ints:
+    """Vectors from the start of each ray to its end; `shot` and `round_` are those of each round of all shots."""
     burst, several, ray = parts
     length = ray.length_256
     ahead = shots.toward_256 if length is None else shots.direction
     assert ahead is not None  # checked with the shots
-    ahead = ahead if len(shot) == len(shots) else ahead[shot]
     if burst:
-        ahead = recoiled(ahead, round_, burst.recoil_deg)
+        ahead = recoiled(ahead[shot], round_, burst.recoil_deg)
     if isinstance(several, Sweep):
-        c, s = unit(several.turns)
-        ahead = turned(ahead, c[pellet], s[pellet])
+        ahead = kernels_of(fixed_point).turned_to(several.directions, ahead)
     step = ahead if length is None else scaled(ahead, length)
     if isinstance(several, Spread):
-        key = shots.seed[shot], shots.number[shot], round_, pellet
-        step = step + SUB * kernels_of(late.draws).disc_offsets(int(snap(several.radius)), *key)
-    return step
+        offsets = pellets_of(several, shots.seed[shot, None], shots.number[shot, None], round_[:, None])
+        step = step[:, None] + SUB * offsets
+    return step.reshape(-1, 2)
 
 
 @dataclass(frozen=True, eq=False)

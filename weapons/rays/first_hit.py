@@ -67,8 +67,13 @@ class FirstHits:
             rays.shot[hit], rays.round[hit], rays.pellet[hit], self.stack.ids[ends.rank[hit]], one - 1,
             ends.time[hit] / scale * lines.length[hit], weights_at(ends.time[hit], scale, self.ray.fades), one, xy,
         )  # fmt: skip
-        pixels = numbered(rays, rays.rounds, hit, ends.rank[hit], ends.x[hit], ends.y[hit], self.stack)
-        return rows_of_passes(first, pixels, rays, self.stack)
+
+        def pixels(wanted: Bools) -> Ints:
+            """Number the pixels of some of the rays that hit."""
+            own = hit[wanted]
+            return numbered(rays, rays.rounds, own, ends.rank[own], ends.x[own], ends.y[own], self.stack)
+
+        return rows_of_passes(first, rays, self.stack, pixels)
 
     @property
     def passes(self) -> Passes:

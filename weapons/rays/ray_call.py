@@ -15,7 +15,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from hitplanes.planes.common.backend import keep_arena
-from hitplanes.planes.common.checks import Ints
+from hitplanes.planes.common.checks import Bools, Ints
 from hitplanes.planes.common.limits import CHUNK_CELLS, CHUNK_PAIRS
 from hitplanes.planes.scene.derived import View
 from hitplanes.planes.scene.scene import Scene
@@ -30,7 +30,7 @@ from ..kinds.rays import RayWeapon, ends_at_first, is_thin_first
 from ..kinds.weapon import Weapon
 from .contacts import Parts, Rays, Reason, Terminations, Touches, rays_each, rays_of
 from .first_hit import FirstHits, ends_by_march
-from .ray_hits import Later, Passes, RayHits, Stops, Summed, Walk, pixels_of, rows_of_passes, walked_of
+from .ray_hits import Later, Passes, RayHits, Stops, Summed, Walk, rows_of_passes, walked_of
 from .ray_walk import Range, expected_cells, has_whole_walk, trace
 from .raycast import cast_rays, cast_to_ends
 
@@ -49,10 +49,11 @@ Choose = Callable[[int], Candidates]
 
 
 class Made(NamedTuple):
-    """Passes and stops of rays, which were made at once."""
+    """Passes and stops of rays, and the numbers of the pixels that they hit, which were made at once."""
 
     passes: Passes
     stops: Stops
+    numbers: Ints
 
 
 def fired_rays(
@@ -256,19 +257,30 @@ def _followed(
     the walks, or the passes of those that there is no room for; the rows; and the room that is left
     """
     walks: list[Walk | Made] = []
-    summed, pixels, plan = [], [], through.plan
+    summed, plan = [], through.plan
     for walk in _to_ends(rays, ray, shots, through, way, choose):
         summed.append(walk.summed)
-        pixels.append(pixels_of(walk, rays))
-        plan.run("rows", "passes, gathered by object", pixels[-1].nbytes)
+        plan.run("rows", "passes, gathered by object")
         if walk.traced is None:
             walks.append(walk)
             continue
         room -= len(walk.traced[0].x)
-        walks.append(walk if room >= 0 else Made(walk.passes, walk.stops))
         if room < 0:
-            plan.run("passes", "", walk.passes.nbytes)
+            numbers = walk.pixels(rays.rounds) if rays.pellet.any() else np.zeros(0, np.int64)
+            walks.append(Made(walk.passes, walk.stops, numbers))
+            plan.run("passes", "", walk.passes.nbytes + numbers.nbytes)
+        else:
+            walks.append(walk)
     passes = Summed(*map(np.concatenate, zip(*summed, strict=True)))
-    rows = rows_of_passes(passes, np.concatenate(pixels), rays, through.stack)
+    ends = np.cumsum([len(part.shot) for part in summed])[:-1]
+
+    def pixels(wanted: Bools) -> Ints:
+        """Number the pixels that some of the passes hit."""
+        parts = zip(walks, np.split(wanted, ends), strict=True)
+        return np.concatenate(
+            [part.numbers if isinstance(part, Made) else part.pixels(rays.rounds, own) for part, own in parts]
+        )
+
+    rows = rows_of_passes(passes, rays, through.stack, pixels)
     plan.run("rows", "", rows.nbytes)
     return walks, rows, room

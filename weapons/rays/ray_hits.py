@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
 from hitplanes.planes.bits.bit_rows import row_order
-from hitplanes.planes.common.checks import Floats, InputError, Ints
+from hitplanes.planes.common.checks import Bools, Floats, InputError, Ints
 from hitplanes.planes.common.limits import CHUNK_CELLS, HALF, IDS_MAX, SUB, WEIGHT_FULL
 from hitplanes.planes.grid.fixed_point import muldiv, pixel
 from hitplanes.planes.grid.rasterize import Lines
@@ -148,6 +148,16 @@ class Walk:
     def walked(self) -> Contacts:
         """Walked cells of objects, in any order."""
         return cells_hit(self.contacts()[0], self.ends, self.stack)
+
+    def pixels(self, rounds: int, hits: Bools | None = None) -> Ints:
+        """Numbers of the pixels of objects that rays hit, each once; those of some `hits` at least, or of all.
+
+        See `numbered`; `rounds` are those of each shot.
+        """
+        walk = self if hits is None or self.traced else replace(self, hit=self.hit.take(hits))
+        cells = walk.walked
+        of = cells.ray[cells.pair], cells.rank[cells.pair]
+        return sorted_once(numbered(self.rays, rounds, *of, cells.x, cells.y, self.stack))
 
     @cached_property
     def summed(self) -> Summed:
@@ -501,59 +511,68 @@ def _rows_of(rows: Rows, passes: Passes) -> Ints:
     return np.asarray(order[np.searchsorted(of_row[order], of_pass)])
 
 
-def pixels_of(walk: Walk, rays: Rays) -> Ints:
-    """Numbers of the pixels that a walk of some of the rays hits, each once; none if no shot has several pellets."""
-    if not rays.pellet.any():
-        return np.zeros(0, np.int64)
-    cells = walk.walked
-    pair = cells.pair
-    return sorted_once(
-        numbered(walk.rays, rays.rounds, cells.ray[pair], cells.rank[pair], cells.x, cells.y, walk.stack)
-    )
+Numbered = Callable[[Bools], Ints]
+"""Function that numbers the pixels of objects that some passes hit, given by a mask of all passes."""
 
 
 def numbered(rays: Rays, rounds: int, ray: Ints, rank: Ints, x: Ints, y: Ints, stack: Stack) -> Ints:
     """Numbers of pixels (n,) of items, given relative to the starts of rays; each round of each shot counts anew."""
     left, top = (stack.box_xyxy[rank, :2] - rays.origin_xy[ray]).T
-    number: Ints = _first_number(rays, rounds, ray, rank, stack) + (y - top) * stack.width[rank] + x - left
+    first = _first_number(rays.shot[ray] * rounds + rays.round[ray], rank, stack)
+    return np.asarray(first + (y - top) * stack.width[rank] + x - left)
+
+
+def _first_number(turn: Ints, rank: Ints, stack: Stack) -> Ints:
+    """Numbers of the first pixels of the boxes of items; `turn` counts the rounds of all shots."""
+    number: Ints = turn * stack.numbers[-1] + stack.numbers[rank]
     return number
 
 
-def _first_number(rays: Rays, rounds: int, ray: Ints, rank: Ints, stack: Stack) -> Ints:
-    """Numbers of the first pixels of the boxes of items."""
-    number: Ints = (rays.shot[ray] * rounds + rays.round[ray]) * stack.numbers[-1] + stack.numbers[rank]
-    return number
-
-
-def rows_of_passes(passes: Summed, pixels: Ints, rays: Rays, stack: Stack) -> Rows:
-    """Sum the passes of all rays of whole shots up to rows; `pixels` are those of `pixels_of`, once or more."""
+def rows_of_passes(passes: Summed, rays: Rays, stack: Stack, pixels: Numbered) -> Rows:
+    """Sum the passes of all rays of whole shots up to rows; pixels that several pellets hit are counted when read."""
     rounds, pellets_fired = rays.rounds, int(rays.pellet.max(initial=0)) + 1
     if pellets_fired == 1:  # each pass is a row
         x, y = (passes.entry_xy - rays.origin_xy[passes.shot * rounds + passes.round]).T
         return Rows(
-            passes.shot.copy(), passes.round, passes.object, passes.samples, passes.samples, passes.weight,
-            np.ones(len(x), np.int64), passes.entry_xy, x * x + y * y,
+            passes.shot.copy(), passes.round, passes.object, passes.samples, None, passes.weight,
+            None, passes.entry_xy, x * x + y * y,
         )  # fmt: skip
-    group = groups_of(passes, rounds)
-    order = row_order(group, passes.entry_px, passes.pellet, passes.order)
-    first = begins(group[order])
-    best = order[first]
-    number = np.zeros(len(group), np.int64)
-    number[order] = np.cumsum(first) - 1
-    samples = np.bincount(number, passes.samples, len(best)).astype(np.int64)
-    weight = np.bincount(number, passes.weight, len(best)).astype(np.int64)
-    pellets = np.bincount(number, minlength=len(best))
-    ray = (passes.shot * rounds + passes.round)[best] * pellets_fired + passes.pellet[best]
-    distinct = samples
-    if (pellets > 1).any():
-        rank = stack.ranks(passes.object[best])
-        begin = _first_number(rays, rounds, ray, rank, stack)
-        ends = begin + stack.numbers[rank + 1] - stack.numbers[rank]
-        distinct = np.diff(np.searchsorted(sorted_once(pixels), [begin, ends]), axis=0)[0]
-    ray_of = passes.shot[best], passes.round[best]
-    sort = row_order(*ray_of, passes.entry_px[best], passes.pellet[best], passes.order[best])
-    best = best[sort]
+    order = row_order(passes.shot, passes.round, passes.entry_px, passes.pellet, passes.order)
+    group = groups_of(passes, rounds)[order]
+    alike = np.argsort(group, kind="stable")  # passes of each row, that of the nearest pellet first
+    first = np.flatnonzero(begins(group[alike]))
+    row = np.argsort(alike[first])  # of which groups the rows are, in their order
+    order, count = order[alike], np.diff(first, append=len(alike))
+    best, pellets = order[first][row], count[row]
+    samples, weight = (np.add.reduceat(column[order], first)[row] for column in (passes.samples, passes.weight))
+    shot, round_, entry_xy, distinct = passes.shot[best], passes.round[best], passes.entry_xy[best], None
+    turn = shot * rounds + round_
+    shared = np.flatnonzero(pellets > 1)
+    if len(shared):
+        wanted = np.zeros(len(order), np.bool_)
+        wanted[order] = np.repeat(count > 1, count)
+        of = turn[shared], passes.object[best[shared]]
+        distinct = partial(_distinct, samples, shared, *of, stack, partial(pixels, wanted))
+    away = entry_xy - rays.origin_xy[turn * pellets_fired + passes.pellet[best]]
     return Rows(
-        passes.shot[best], passes.round[best], passes.object[best], samples[sort], distinct[sort], weight[sort],
-        pellets[sort], passes.entry_xy[best], ((passes.entry_xy[best] - rays.origin_xy[ray[sort]]) ** 2).sum(axis=1),
+        shot, round_, passes.object[best], samples, None, weight, pellets, entry_xy, (away**2).sum(axis=1),
+        distinct=distinct,
     )  # fmt: skip
+
+
+def _distinct(samples: Ints, shared: Ints, turn: Ints, items: Ints, stack: Stack, pixels: Callable[[], Ints]) -> Ints:
+    """Pixels of rows, each once.
+
+    Parameters
+    ----------
+    samples : (n,) samples of all rows
+    shared : (k,) rows of several pellets
+    turn, items : (k,) round of each of these, and id of its object
+    pixels : numbers the pixels of these rows, once or more
+    """
+    rank = stack.ranks(items)
+    first = _first_number(turn, rank, stack)
+    ends = first + stack.numbers[rank + 1] - stack.numbers[rank]
+    counted = samples.copy()
+    counted[shared] = np.diff(np.searchsorted(sorted_once(pixels()), [first, ends]), axis=0)[0]
+    return counted
