@@ -273,19 +273,16 @@ def test_no_box_that_meets_is_missing_in_a_cell(seed: int, far: int, bits: int, 
     st.sampled_from([0, 2**14]),
     st.sampled_from([1, 2**17]),
 )
-@pytest.mark.parametrize("name", ["hitplanes.planes.bits.cells", "hitplanes.planes.jit.bit_rows"])
-def test_boxes_that_meet(name: str, seed: int, far: int, brute: int, few: int, at_once: int) -> None:
-    if ".jit." in name:
-        pytest.importorskip("numba")
-    kernels, rng = importlib.import_module(name), np.random.default_rng(seed)
+def test_boxes_that_meet(seed: int, far: int, brute: int, few: int, at_once: int) -> None:
+    rng = np.random.default_rng(seed)
     a, b = (boxes(rng, int(rng.integers(0, 12)), far, 60) for _ in range(2))
     if rng.random() < 0.2 and len(a):
         a[0, 2] = a[0, 0] - 1  # empty
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(kernels, "BRUTE_PAIRS", brute)
+        patch.setattr(cells, "BRUTE_PAIRS", brute)
         patch.setattr(cells, "PAIRS_AT_ONCE", at_once)
         patch.setattr(cells, "FEW_PAIRS", few)
-        row, box = kernels.met_boxes(a, b)
+        row, box = cells.met_boxes(a, b)
     truth = [
         (i, k)
         for i, p in enumerate(a.tolist())
@@ -451,9 +448,7 @@ def test_words_of_a_pattern_hold_its_pixels(seed: int) -> None:
 
 @examples(100, deadline=None)
 @given(SEEDS, st.sampled_from([0, 2**40]))
-@pytest.mark.parametrize("name", ["hitplanes.planes.bits.bit_rows", "hitplanes.planes.jit.bit_rows"])
-def test_pixels_of_patterns_within_bounds(name: str, seed: int, far: int) -> None:
-    rows = pytest.importorskip(name) if ".jit." in name else importlib.import_module(name)
+def test_pixels_of_patterns_within_bounds(seed: int, far: int) -> None:
     rng = np.random.default_rng(seed)
     masks = [rng.random(rng.integers(0, [20, 150])) < rng.choice([0, 0.5, 1]) for _ in range(rng.integers(1, 4))]
     spans = [Spans.from_mask(mask, tuple(rng.integers(-99, 99, 2).tolist())) for mask in masks]
@@ -463,7 +458,7 @@ def test_pixels_of_patterns_within_bounds(name: str, seed: int, far: int) -> Non
     which, place = rng.integers(0, len(spans), 30), rng.integers(-250, 250, (2, 30)) + far
     low, size = rng.integers(-99, 99, 2) + far, rng.integers(1, 150, 2)
     bounds = *low.tolist(), *(low + size - 1).tolist()
-    inside = rows.pixels_within(Placed(which, *place, *place), bits, count, bounds)
+    inside = bit_rows.pixels_within(Placed(which, *place, *place), bits, count, bounds)
     for kind, *xy, found in np.stack([which, *place, inside], axis=1).tolist():
         pixels = spans[kind].pixels() + xy
         assert found == ((pixels >= low) & (pixels < low + size)).all(axis=1).sum()
@@ -505,11 +500,8 @@ def test_without_numba_there_is_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("apart", [2**15, 2**16, 2**31, 2**32, 2**40])
-@pytest.mark.parametrize("name", ["hitplanes.planes.bits.cells", "hitplanes.planes.jit.bit_rows"])
-def test_boxes_far_apart_do_not_meet(name: str, apart: int) -> None:
-    if ".jit." in name:
-        pytest.importorskip("numba")
-    row, box = importlib.import_module(name).met_boxes(
+def test_boxes_far_apart_do_not_meet(apart: int) -> None:
+    row, box = cells.met_boxes(
         np.array([[0, 0, 9, 9], [apart, 0, apart + 9, 9]]), np.array([[5, 5, 6, 6], [5, apart, 6, apart]])
     )
     assert (row.tolist(), box.tolist()) == ([0], [0])

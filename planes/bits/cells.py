@@ -1,7 +1,4 @@
-"""Cells of the world: each lists the boxes that a pattern placed anywhere in it may meet.
-
-All functions map arrays to arrays; `jit.bit_rows` has the compiled kernels.
-"""
+"""Cells of the world: each lists the boxes that a pattern placed anywhere in it may meet."""
 
 from __future__ import annotations
 

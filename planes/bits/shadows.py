@@ -30,8 +30,8 @@ from ..common.backend import LruCache, kernels_of
 from ..common.checks import Bools, Floats, Ints
 from ..common.limits import CHUNK_SAMPLES
 from ..grid.spans import Box, begins, clipped, each_pixel, merged_runs, pieces, ragged, rectangles, sorted_once
-from . import cells
 from .bit_rows import WORD, Words
+from .cells import met_boxes
 from .span_walk import Runs
 from .visible import sides_of
 
@@ -156,8 +156,7 @@ def _rectangles_of(mask_of: Callable[[int], Bools], row: int, block: tuple[int, 
 def ways_met(boxes_xyxy: Ints, origin_xy: Ints, blockers: Blockers) -> tuple[Ints, Ints]:
     """Sorted pairs (row, blocker) of which the box may meet the way from an origin (n, 2) to pixels of a box (n, 4)."""
     low, high = np.minimum(boxes_xyxy[:, :2], origin_xy), np.maximum(boxes_xyxy[:, 2:], origin_xy)
-    found: tuple[Ints, Ints] = kernels_of(cells).met_boxes(np.concatenate([low, high], axis=1), blockers.box_xyxy)
-    return found
+    return met_boxes(np.concatenate([low, high], axis=1), blockers.box_xyxy)
 
 
 def begun_in(origin_xy: Ints, blockers: Blockers) -> tuple[Ints, Ints]:

@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..common.backend import LruCache, kernels_of
+from ..common.backend import LruCache
 from ..common.checks import Bools, Ints
 from ..grid.spans import Box
 from ..scene.derived import NEVER, Derivative, View
 from ..scene.items import Items, Stack
-from . import bit_rows, cells
+from . import bit_rows
 from .bit_rows import WORD, Words
-from .cells import Cells
+from .cells import Cells, cells_of, met_boxes
 from .front_to_back import OrderedTiles
 from .tiles import Tiles
 
@@ -71,7 +71,7 @@ class VisibleSet:
     def cells(self, reach_xyxy: Ints) -> Cells:
         """Tiles that a pattern with this box may meet, by cells of its position; kept for the last few boxes."""
         boxes = self.seen.box_xyxy
-        return self._cells.get(tuple(reach_xyxy.tolist()), lambda: cells.cells_of(boxes, reach_xyxy, SHOT_BITS))
+        return self._cells.get(tuple(reach_xyxy.tolist()), lambda: cells_of(boxes, reach_xyxy, SHOT_BITS))
 
     def cells_for(self, boxes_xyxy: Ints, placements: int) -> tuple[Cells | None, int]:
         """Cells for placements of patterns with boxes (n, 4), and the bytes newly made; None for few placements.
@@ -145,7 +145,7 @@ def in_front(boxes_xyxy: Ints, tiles: Ints, blocks: Bools) -> tuple[Ints, Ints]:
     blocks : (T,) whether a tile can cover others
     """
     front = np.arange(len(boxes_xyxy)) if blocks.all() else np.flatnonzero(blocks)
-    place, other = kernels_of(cells).met_boxes(boxes_xyxy[tiles], boxes_xyxy[front])
+    place, other = met_boxes(boxes_xyxy[tiles], boxes_xyxy[front])
     before = (front[other] < tiles[place]).nonzero()[0]
     return place[before], front[other[before]]
 

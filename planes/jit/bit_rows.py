@@ -1,4 +1,4 @@
-"""Compiled kernels of bit rows, and of boxes that meet; they work pair by pair and row by row."""
+"""Compiled kernels of bit rows; they work pair by pair and row by row."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from ..bits import bit_rows, cells, shadows
-from ..bits.bit_rows import NO_STRIPS, NO_SUMS, WORD, PatternBits, Placed, Words
+from ..bits import bit_rows, shadows
+from ..bits.bit_rows import NO_STRIPS, NO_SUMS, WORD, PatternBits, Words
 from ..common.backend import in_parts
 from ..common.checks import Ints
-from ..grid.spans import WIDEST, Box, RowRuns
+from ..grid.spans import WIDEST, RowRuns
 from .cache import compiled, helper
 
 INTS = types.Array(types.int64, 1, "A", readonly=True)
@@ -365,35 +365,6 @@ def bits_of_runs(runs: RowRuns, count: int, normal: Ints) -> PatternBits | None:
     )
 
 
-@compiled(types.void(INTS, INTS, INTS, BOXES, INTS, INTS, WORDS, INTS, types.UniTuple(types.int64, 4), OUT))
-def _pixels_within(pattern, x, y, box, first, rows, words, count, bounds, inside):
-    for placement in range(len(x)):
-        kind = pattern[placement]
-        left, top = x[placement] + box[kind, 0], y[placement] + box[kind, 1]
-        right, low = x[placement] + box[kind, 2], y[placement] + box[kind, 3]
-        inside[placement] = count[kind]
-        if left >= bounds[0] and top >= bounds[1] and right <= bounds[2] and low <= bounds[3]:
-            continue
-        pixels, begin, at = 0, left - 63, first[kind] + max(bounds[1] - top, 0)
-        for _ in range((right - begin >> 6) + 1):
-            kept = _columns(bounds[0], bounds[2], begin)
-            for row in range(min(low, bounds[3]) - max(top, bounds[1]) + 1 if kept else 0):
-                pixels += bits_of(words[at + row] & kept)
-            begin, at = begin + WORD, at + rows[kind]
-        inside[placement] = pixels
-
-
-def pixels_within(placed: Placed, windows: PatternBits, count: Ints, bounds: Box) -> Ints:
-    """See `bits.bit_rows.pixels_within`."""
-    inside = np.empty(len(placed.x), np.int64)
-    bits = windows.box_xyxy, windows.first, windows.rows, windows.words
-    _pixels_within(placed.pattern, placed.x, placed.y, *bits, count, bounds, inside)
-    return inside
-
-
-BRUTE_PAIRS = 2**14  # most pairs of boxes that are compared one by one; of more, numpy compares several at once
-
-
 @helper(inline="always")
 def cell_at(at_x, at_y, x, y, bits, wide, high):
     """The cell of a pixel; -1 if it lies in none."""
@@ -411,29 +382,3 @@ def meets_any(box, at, taken, count):
         if across and box[at, 1] <= box[other, 3] and box[at, 3] >= box[other, 1]:
             return True
     return False
-
-
-@compiled(types.UniTuple(types.int64, 2)(BOXES, BOXES, types.int64, types.int64, ROWS_OUT))
-def _met(asked, boxes, row, count, pairs):
-    """Write pairs from a row of `asked` on, as long as there is room; return the row that follows, and their number."""
-    while row < len(asked) and count + len(boxes) <= pairs.shape[1]:
-        left, top, right, bottom = asked[row]
-        for box in range(len(boxes)):
-            across = (left <= boxes[box, 2]) & (right >= boxes[box, 0])
-            pairs[0, count], pairs[1, count] = row, box  # the next overwrites it if the boxes do not meet
-            count += across & (top <= boxes[box, 3]) & (bottom >= boxes[box, 1])
-        row += 1
-    return row, count
-
-
-def met_boxes(asked_xyxy: Ints, boxes_xyxy: Ints) -> tuple[Ints, Ints]:
-    """See `bits.cells.met_boxes`."""
-    if len(asked_xyxy) * len(boxes_xyxy) > BRUTE_PAIRS:
-        return cells.met_boxes(asked_xyxy, boxes_xyxy)
-    asked_xyxy, boxes_xyxy = np.ascontiguousarray(asked_xyxy), np.ascontiguousarray(boxes_xyxy)
-    row, count, pairs = 0, 0, np.empty((2, 4 * len(asked_xyxy) + len(boxes_xyxy)), np.int64)
-    while True:
-        row, count = _met(asked_xyxy, boxes_xyxy, row, count, pairs)
-        if row == len(asked_xyxy):
-            return pairs[0, :count], pairs[1, :count]
-        pairs = np.concatenate([pairs, np.empty_like(pairs)], axis=1)

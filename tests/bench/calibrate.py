@@ -22,11 +22,11 @@ from unittest.mock import patch
 import numpy as np
 
 from hitplanes import Disc, Pistol, Point, Scene, Sprite, fire, prepare, use_jit
-from hitplanes.planes.bits import cells
+from hitplanes.planes.bits.cells import met_boxes
 from hitplanes.planes.bits.tiles import stride_of
 from hitplanes.planes.broadphase.boxes import Index
 from hitplanes.planes.common import costs
-from hitplanes.planes.common.backend import in_parts, kernels_of, use_threads
+from hitplanes.planes.common.backend import in_parts, use_threads
 from hitplanes.weapons.fire.strategy import expected_near
 
 FILE = Path(__file__).parents[2] / "planes" / "common" / "costs.py"
@@ -147,8 +147,8 @@ def of_integers(rounds: int) -> dict[str, float]:
 def of_boxes(rounds: int) -> dict[str, float]:
     """Costs of comparing boxes one by one, and by a BVH."""
     scene, found, rows = scene_of(ITEMS[-1]), {}, []
-    boxes, met = scene.items.stack().box_xyxy, kernels_of(cells).met_boxes
-    found["box_pair"] = least(partial(met, boxes[:500], boxes), rounds) / (500 * len(boxes))
+    boxes = scene.items.stack().box_xyxy
+    found["box_pair"] = least(partial(met_boxes, boxes[:500], boxes), rounds) / (500 * len(boxes))
     found["bvh_item"] = least(lambda: Index("bvh").read(scene.items), rounds) / len(boxes)
     index = Index("bvh")
     index.read(scene.items)

@@ -18,9 +18,9 @@ from weakref import ref
 import numpy as np
 
 from hitplanes.planes import late
-from hitplanes.planes.bits import cells
+from hitplanes.planes.bits.cells import met_boxes
 from hitplanes.planes.bits.span_walk import BLOCK, HIT, SKIP, Kinds, Pairs
-from hitplanes.planes.common.backend import LruCache, kernels_of
+from hitplanes.planes.common.backend import LruCache
 from hitplanes.planes.common.checks import Bools, Ints, boxes_in, choice
 from hitplanes.planes.common.limits import BOUNDING_BYTES, BOUNDING_CACHE_BYTES, CORNERS, GROWN_PX, PAIRS_AT_ONCE, SUB
 from hitplanes.planes.grid.rasterize import Lines
@@ -155,7 +155,7 @@ class Candidates:
         if self.prefilter.name == "none":
             return self.every(len(boxes_xyxy))
         if self.index is None:
-            row, rank = kernels_of(cells).met_boxes(boxes_xyxy, self.stack.box_xyxy)
+            row, rank = met_boxes(boxes_xyxy, self.stack.box_xyxy)
         else:
             m, rows = len(self.stack), np.flatnonzero((boxes_xyxy[:, :2] <= boxes_xyxy[:, 2:]).all(axis=1))
             row, item = self.index.query(self.items, boxes_xyxy[rows])

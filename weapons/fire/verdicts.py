@@ -12,10 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from hitplanes.planes.bits import bit_rows
+from hitplanes.planes.bits.bit_rows import pixels_within
 from hitplanes.planes.bits.front_to_back import NO_FLAGS
 from hitplanes.planes.bits.span_walk import OF_PATTERNS, Verdict
-from hitplanes.planes.common.backend import kernels_of
 from hitplanes.planes.common.checks import Ints
 
 from ..kinds.placements import Placements, placements_for
@@ -80,7 +79,7 @@ def _fired_and_inside(request: Request) -> tuple[Ints, Ints, Placements | None]:
         count, table = placements.count, placements.table
         inside = count
         if bounds is not None:
-            inside = kernels_of(bit_rows).pixels_within(placed_of(placements), table.bits, table.count, bounds)
+            inside = pixels_within(placed_of(placements), table.bits, table.count, bounds)
         fired.append(count if each == 1 else count.reshape(-1, each).sum(axis=1))
         within.append(inside if each == 1 else inside.reshape(-1, each).sum(axis=1))
     return np.concatenate(fired), np.concatenate(within), placements if len(fired) == 2 else None
