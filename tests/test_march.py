@@ -67,9 +67,9 @@ def some_plane(rng: random.Random) -> np.ndarray[Any, np.dtype[np.bool_]]:
 
 @examples(34, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(rng=worlds)
-def test_the_clearance_is_the_distance_in_city_blocks(kernels: ModuleType, rng: random.Random) -> None:
+def test_the_clearance_is_the_distance_in_city_blocks(rng: random.Random) -> None:
     plane = some_plane(rng)
-    found = kernels.distances_of(plane)
+    found = distance_field.distances_of(plane)
     assert found.dtype == np.uint8 and found.shape == tuple(n + 2 * distance_field.PAD for n in plane.shape)
     taken = [
         (y + distance_field.PAD, x + distance_field.PAD)
@@ -79,10 +79,10 @@ def test_the_clearance_is_the_distance_in_city_blocks(kernels: ModuleType, rng: 
         assert distance == min((abs(y - v) + abs(x - u) for v, u in taken), default=distance_field.FAR)
 
 
-def test_the_clearance_ends_at_what_a_byte_holds(kernels: ModuleType) -> None:
+def test_the_clearance_ends_at_what_a_byte_holds() -> None:
     plane = np.zeros((2, 700), np.bool_)
     plane[1, 650] = True
-    row = kernels.distances_of(plane)[distance_field.PAD].tolist()
+    row = distance_field.distances_of(plane)[distance_field.PAD].tolist()
     assert row == [min(abs(x - distance_field.PAD - 650) + 1, distance_field.FAR) for x in range(704)]
 
 
@@ -104,7 +104,7 @@ def test_the_first_taken_cell_is_the_first_that_the_oracle_meets(kernels: Module
     rays = [some_ray(rng, *plane.shape) for _ in range(rng.choice([1, 7, 80]))]
     start, step = (np.array(column) for column in zip(*rays, strict=True))
     note(f"{plane.astype(int).tolist()} {rays}")
-    distances = kernels.distances_of(plane)
+    distances = distance_field.distances_of(plane)
     entry, cell, several = kernels.first_taken(distances, start + 256 * distance_field.PAD, step)
     for k, (at, by) in enumerate(rays):
         if entry[k] == distance_field.UNDECIDED:
@@ -126,7 +126,7 @@ def test_rays_from_anywhere_read_nothing_beyond_the_plane(kernels: ModuleType) -
     """Also those that begin or end as far off as a position may be, or are too long to be followed."""
     plane = np.zeros((5, 7), np.bool_)
     plane[2, 3] = True
-    distances = kernels.distances_of(plane)
+    distances = distance_field.distances_of(plane)
     rng = np.random.default_rng(1)
     start = rng.integers(-(2**48), 2**48, (2000, 2))
     step = rng.integers(-(2**29), 2**29, (2000, 2))

@@ -15,7 +15,6 @@ and each step looks at the cell on the other side.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
@@ -23,7 +22,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..common.backend import kernels_of
 from ..common.checks import Bools, Floats, Ints, Labels
 from ..common.limits import HALF, SUB
 from ..grid.spans import Box, meets
@@ -344,5 +342,5 @@ class DistanceField(Derivative):
         """Distances (h + 2 PAD, w + 2 PAD) of the present version, from the labels of that version."""
         with self._lock:
             if not self.is_made(items) or self._made is None:
-                self._made = kernels_of(sys.modules[__name__]).distances_of(labels != 0)
+                self._made = distances_of(labels != 0)
             return self._made

@@ -69,7 +69,7 @@ COMPILED = Costs(
     integers_call=inf, integers_placement=inf, integers_pair=inf, integers_bit=inf,
     box_pair=0.594, bvh_call=61300, bvh_placement=300, bvh_moved=847, bvh_item=413,
     cast_call=96700, cast_ray=131, cast_pair=0.791,
-    march_call=113000, march_ray=75.6, field_pixel=1.16,
+    march_call=113000, march_ray=75.6, field_pixel=4.09,
     prepared_march=7020, prepared_cast=3100, prepared_cast_item=1.82,
     prepared_tile=0.955, prepared_near=352, thread=953000,
 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Compiled kernels of the distance field and its march, of rays at pixels, and of turned masks."""
+"""Compiled kernels of the march through the distance field, of rays at pixels, and of turned masks."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from itertools import accumulate
 import numpy as np
 from numba import types
 
-from ..bits.distance_field import EXACT, FAR, LONGEST, NOTHING, PAD, UNDECIDED, Clearance
+from ..bits.distance_field import EXACT, LONGEST, NOTHING, UNDECIDED, Clearance
 from ..common.checks import Bools, Ints
 from ..common.limits import HALF, MAPPED_PIXELS, SUB, TRIG_BITS
 from ..grid.rasterize import DIAGONAL
@@ -28,36 +28,6 @@ ROUNDS = 4
 
 N, STOP, ALONG, ACROSS, BASE, A, B, C, ASIDE, RAY, COLUMNS = range(11)
 """Columns of a block: N, the crossings before a ray's next look, and those of `bits.distance_field._ways`."""
-
-
-@compiled()
-def distances_of(taken: Bools) -> Clearance:
-    """See `bits.distance_field.distances_of`."""
-    h, w = taken.shape
-    distance = np.full((h + 2 * PAD, w + 2 * PAD), FAR, np.uint8)
-    for y in range(PAD, h + PAD):
-        for x in range(w):
-            if taken[y - PAD, x]:
-                distance[y, x + PAD] = 0
-    height, width = distance.shape
-    for y in range(1, height):
-        for x in range(width):
-            distance[y, x] = min(distance[y, x], distance[y - 1, x] + 1)
-        _spread_along(distance[y])
-    for y in range(height - 2, -1, -1):
-        for x in range(width):
-            distance[y, x] = min(distance[y, x], distance[y + 1, x] + 1)
-        _spread_along(distance[y])
-    return distance
-
-
-@helper()
-def _spread_along(row: Clearance) -> None:
-    """Limit each cell of a row to 1 more than the cells beside it."""
-    for x in range(1, len(row)):
-        row[x] = min(row[x], row[x - 1] + 1)
-    for x in range(len(row) - 2, -1, -1):
-        row[x] = min(row[x], row[x + 1] + 1)
 
 
 @compiled(error_model="numpy")
