@@ -129,35 +129,22 @@ def restrided(rows: int, high: int, stride: int, wider: int) -> int:
     return int.from_bytes(b"".join([data[k : k + size] + gap for k in range(0, len(data), size)]), "little")
 
 
-class Made(dict[int, "Column"]):
-    """Squares as [i][j], each made when it is first asked for; those beyond EDGE raise KeyError.
+class Squares(dict[tuple[int, int], Square]):
+    """Squares by column and row, each made when it is first asked for; those beyond EDGE raise KeyError.
 
     Parameters
     ----------
-    make : function of i and j that returns a square, and may store it here
+    make : function of a place that returns a square, and may store it here
     """
 
-    def __init__(self, make: Callable[[int, int], Square]) -> None:
+    def __init__(self, make: Callable[[tuple[int, int]], Square]) -> None:
         super().__init__()
         self.make = make
 
-    def __missing__(self, i: int) -> Column:
-        if not -EDGE < i < EDGE:
-            raise KeyError(i)
-        return self.setdefault(i, Column(self, i))
-
-
-class Column(dict[int, Square]):
-    """Squares of one column i."""
-
-    def __init__(self, made: Made, i: int) -> None:
-        super().__init__()
-        self.made, self.i = made, i
-
-    def __missing__(self, j: int) -> Square:
-        if not -EDGE < j < EDGE:
-            raise KeyError(j)
-        return self.made.make(self.i, j)
+    def __missing__(self, place: tuple[int, int]) -> Square:
+        if max(map(abs, place)) >= EDGE:
+            raise KeyError(place)
+        return self.make(place)
 
 
 class GroundCache:
@@ -194,7 +181,7 @@ def look(fired: Round) -> tuple[Look, int]:
         """Append the hits on the tiles near a pixel to an answer, the nearest first."""
         near: PositionCache = hits._present.near
         ids = hits._present.stack.ids
-        square = near.made[x >> CELL_SHIFT][y >> CELL_SHIFT]
+        square = near.made[x >> CELL_SHIFT, y >> CELL_SHIFT]
         found: list[Hit] = []
         if square is UNMADE:
             found, square = near.walked(pattern, x, y), ()
@@ -229,7 +216,7 @@ class PositionCache:
     """
 
     def __init__(self, scene: Scene, ground: GroundCache, kept: Filter, reach: int, room: int) -> None:
-        self.made = Made(self._asked)
+        self.made = Squares(self._asked)
         self.quick: Any = self.made
         self.nbytes, self._room = 0, room
         self._scene, self._ground, self._reach, self._view = scene, ground, reach, kept.view(ground.pierce)
@@ -288,8 +275,8 @@ class PositionCache:
         if ns > now.tiles_call:
             raise KeyError
 
-    def _asked(self, i: int, j: int) -> Square:
-        """Square (i, j), which is made if it does not exist; UNMADE if there is no visible set."""
+    def _asked(self, place: tuple[int, int]) -> Square:
+        """Square of a column and a row, which is made if it does not exist; UNMADE if there is no visible set."""
         visible = self._visible or self._scene.derived.visible(self._view).made(self._scene.items)
         if visible is None:
             return UNMADE
@@ -297,14 +284,13 @@ class PositionCache:
             self._visible = visible
             if self.nbytes > self._room:
                 self._clear()
-            column = self.made[i]
-            if j not in column:
-                square = self._square(visible, i << CELL_SHIFT, j << CELL_SHIFT)
+            if place not in self.made:
+                square = self._square(visible, *(k << CELL_SHIFT for k in place))
                 side = 2 * self._reach + 1
                 crowded = integers_ns(len(square), side, side) > costs.NUMPY.tiles_call
-                column[j] = UNMADE if crowded else square  # so each shot finds out whether `fire` is faster
+                self.made[place] = UNMADE if crowded else square  # so each shot finds out whether `fire` is faster
                 self.nbytes += CELL_BYTES + ENTRY_BYTES * len(square)
-            return column[j]
+            return self.made[place]
 
     def _square(self, visible: VisibleSet, x: int, y: int) -> Square:
         """Visible tiles near the square that begins at a pixel, front to back."""

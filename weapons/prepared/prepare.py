@@ -222,7 +222,7 @@ class ReadyPattern(Ready[Hits]):
                             self._straight(x, y, hits)
                             return hits
                         column, row = floor(x + PIXEL), floor(y + PIXEL)
-                        if quick[column >> CELL_SHIFT][row >> CELL_SHIFT]:
+                        if quick[column >> CELL_SHIFT, row >> CELL_SHIFT]:
                             if x == ODD or y == ODD:  # its pixel would be wrong by one
                                 return self._looked_up(at, aim, toward, shot)
                             self._straight(column, row, hits)
