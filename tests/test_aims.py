@@ -16,7 +16,7 @@ from hitplanes.planes.bits import bit_rows
 from hitplanes.planes.bits.tiles import big_pattern
 from hitplanes.planes.common.backend import COMPILED
 from hitplanes.planes.common.limits import REACH_MAX
-from hitplanes.planes.grid import fixed_point, rasterize, turns
+from hitplanes.planes.grid import fixed_point, rasterize
 from hitplanes.planes.grid.fixed_point import ONE, all_quarters, quarters, turned, unit, unit_toward
 from hitplanes.planes.grid.spans import Spans
 from hitplanes.weapons.kinds.areas import FEW_AIMS, AreaWeapon, pattern_of, patterns_of
@@ -130,16 +130,16 @@ def each_run(runs: rasterize.RowRuns, count: int) -> list[list[list[int]]]:
 )
 def test_compiled_turned_masks_are_those_of_numpy(mask: list[str], pivot: tuple[int, int], aims: list[float]) -> None:
     pytest.importorskip("numba")
-    kernels = importlib.import_module(COMPILED[turns.__name__])
-    edges = turns.edges_of(np.array([[c == "#" for c in row] for row in [*mask, "#" * 17]]), pivot)
+    kernels = importlib.import_module(COMPILED[rasterize.__name__])
+    edges = rasterize.edges_of(np.array([[c == "#" for c in row] for row in [*mask, "#" * 17]]), pivot)
     split = all_quarters(np.concatenate([np.stack(unit(np.array(aims, float)), axis=1), TIES]))
-    own, other = (each_run(one.turned_runs(edges, *split), len(split[0])) for one in (turns, kernels))
+    own, other = (each_run(one.turned_runs(edges, *split), len(split[0])) for one in (rasterize, kernels))
     assert own == other
 
 
 def test_rectangles_of_a_mask_are_runs_of_equal_columns_in_adjacent_rows() -> None:
     mask = np.array([[c == "#" for c in row] for row in ("##.#", "##.#", ".#..", "....", "##..")])
-    edges = turns.edges_of(mask, (0, 0))
+    edges = rasterize.edges_of(mask, (0, 0))
     left, right, top, low = (edges.sides[:, : edges.begin[1]] + 128) // 256
     assert sorted(zip(left, right, top, low, strict=True)) == [(0, 2, 0, 2), (0, 2, 4, 5), (1, 2, 2, 3), (3, 4, 0, 2)]
 

@@ -575,7 +575,7 @@ SHOT = "scene.add([[True] * 9] * 9, (20, 20)); assert fire(scene, {}, (20, 20), 
 OF_SCENES = (
     "bits.bit_rows bits.cells bits.front_to_back bits.span_walk bits.tiles"
     " common.backend common.checks common.costs common.limits common.tables grid.fixed_point"
-    " grid.rasterize grid.spans grid.turns late scene.derived scene.items scene.objects scene.poses scene.scene"
+    " grid.rasterize grid.spans late scene.derived scene.items scene.objects scene.poses scene.scene"
     " scene.sprite scene.variants"
 )
 OF_FIRE = (

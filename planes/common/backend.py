@@ -51,7 +51,6 @@ Part = TypeVar("Part")
 COMPILED = {
     "hitplanes.planes.grid.fixed_point": "hitplanes.planes.jit.scene",
     "hitplanes.planes.grid.rasterize": "hitplanes.planes.jit.scene",
-    "hitplanes.planes.grid.turns": "hitplanes.planes.jit.planes",
     "hitplanes.planes.scene.variants": "hitplanes.planes.jit.planes",
     "hitplanes.planes.bits.label_plane": "hitplanes.planes.jit.areas",
     "hitplanes.weapons.kinds.draws": "hitplanes.planes.jit.scene",

@@ -156,9 +156,6 @@ def all_quarters(direction: Ints) -> tuple[Ints, Ints, Ints]:
     return k, c, s
 
 
-FEW_ANGLES = 8  # most angles that are split one by one
-
-
 @lru_cache(maxsize=ANGLES_KEPT)
 def quarter_turns(degrees: float) -> tuple[int, int, int]:
     """Split an angle into k quarter turns and a rest in [-45, 45), as (k mod 4, cos, sin) of the rest.
@@ -177,8 +174,6 @@ def quarter_turns(degrees: float) -> tuple[int, int, int]:
 
 def all_quarter_turns(degrees: Sequence[float]) -> list[list[int]]:
     """`quarter_turns` of angles, as three columns."""
-    if 0 < len(degrees) <= FEW_ANGLES:  # an array costs more
-        return [list(column) for column in zip(*map(quarter_turns, degrees), strict=True)]
     return [column.tolist() for column in all_quarters(np.stack(unit(degrees), axis=1))]
 
 

@@ -1,4 +1,4 @@
-"""Compiled kernels of the march through the distance field, of rays at pixels, and of turned masks."""
+"""Compiled kernels of the march through the distance field, of rays at pixels, and of masks that are mapped."""
 
 from __future__ import annotations
 
@@ -10,15 +10,14 @@ from numba import types
 
 from ..bits.distance_field import EXACT, LONGEST, NOTHING, UNDECIDED, Clearance
 from ..common.checks import Bools, Ints
-from ..common.limits import HALF, MAPPED_PIXELS, SUB, TRIG_BITS
+from ..common.limits import HALF, MAPPED_PIXELS, SUB
 from ..grid.rasterize import DIAGONAL
-from ..grid.spans import WIDEST, RowRuns, pieces
-from ..grid.turns import Edges
+from ..grid.spans import pieces
 from ..scene.sprite import frozen
 from ..scene.variants import Grids, Turned
-from .bit_rows import BOXES, FLAGS, INTS, OUT
+from .bit_rows import FLAGS, INTS
 from .cache import compiled, helper
-from .scene import PARTS, PELLETS, STEPS, add_run, at_least, at_most, empty_parts, layout, root_of
+from .scene import PELLETS, STEPS, root_of
 
 BLOCK = 128
 """Rays that march together, so that reads overlap; their columns fit the fastest cache."""
@@ -497,57 +496,3 @@ def turned_masks(masks: Sequence[Bools], which: Ints, grids: Grids) -> Turned:
         found.append(boxes)
     every = np.concatenate(found)
     return Turned(made, every[:, :2], every[:, 4])
-
-
-@helper()
-def _rows_of(sides, pivot_y, c, s):
-    """First and last row of pixels that a turned rectangle may hold; see `turned_runs`."""
-    left, right, top, low = sides
-    first = (min(left * s, right * s) + top * c >> TRIG_BITS) + pivot_y - 1
-    return first >> 8, (max(left * s, right * s) + low * c >> TRIG_BITS) + pivot_y + 1 >> 8
-
-
-@helper()
-def _turned_rows(sides, pivot, c, s, row, first, last):
-    """Fill the first and last pixel that a turned rectangle holds in each row from `row` on; see `turned_runs`."""
-    (left, right, top, low), (x, y) = sides, pivot
-    first[:], last[:] = -WIDEST, WIDEST
-    down = SUB * row - y
-    at_least((left << TRIG_BITS) - down * s + x * c, -SUB * s, SUB * c, first)
-    at_most((right << TRIG_BITS) - down * s + x * c, -SUB * s, SUB * c, last)
-    above, below = down * c - (low << TRIG_BITS) + x * s, down * c - (top << TRIG_BITS) + x * s
-    if s >= 0:
-        at_least(above, SUB * c, SUB * max(s, 1), first)
-        at_most(below, SUB * c, SUB * max(s, 1), last)
-    else:
-        at_least(-below, -SUB * c, -SUB * s, first)
-        at_most(-above, -SUB * c, -SUB * s, last)
-
-
-@compiled(types.Tuple((OUT, OUT, PARTS))(INTS, BOXES, BOXES, INTS, INTS, INTS))
-def _turned_runs(begin, sides, pivots, quarter, c, s):
-    count, most = len(quarter), 0
-    top, low = np.empty(count, np.int64), np.empty(count, np.int64)
-    for k in range(count):
-        turns, top[k], low[k] = quarter[k], LATE, -LATE
-        for r in range(begin[turns], begin[turns + 1]):
-            upper, lower = _rows_of(sides[r], pivots[turns, 1], c[k], s[k])
-            top[k], low[k], most = min(top[k], upper), max(low[k], lower), max(most, lower - upper + 1)
-    shape, y, start = layout(top, low)
-    parts, used = empty_parts(2, len(y)), np.zeros(len(y), np.int64)
-    first, last = np.empty(most, np.int64), np.empty(most, np.int64)
-    for k in range(count):
-        turns = quarter[k]
-        for r in range(begin[turns], begin[turns + 1]):
-            upper, lower = _rows_of(sides[r], pivots[turns, 1], c[k], s[k])
-            high, at = lower - upper + 1, start[k] + upper - top[k]
-            _turned_rows(sides[r], pivots[turns], c[k], s[k], upper, first[:high], last[:high])
-            for i in range(high):
-                parts = add_run(parts, used, at + i, first[i], last[i])
-    return shape, y, parts
-
-
-def turned_runs(edges: Edges, quarter: Ints, c: Ints, s: Ints) -> RowRuns:
-    """See `grid.turns.turned_runs`."""
-    shape, y, parts = _turned_runs(edges.begin, np.ascontiguousarray(edges.sides.T), edges.pivots, quarter, c, s)
-    return RowRuns(shape, y, parts)

@@ -35,9 +35,8 @@ from ..common.limits import (
 )
 from ..grid import rasterize
 from ..grid.fixed_point import over_one, quarter_turns, rounded_div, turned
-from ..grid.rasterize import ellipse
+from ..grid.rasterize import ellipse, quarter_turned
 from ..grid.spans import Spans
-from ..grid.turns import quarter_turned
 from .sprite import UIDS, Outline, Sprite, check_size, fits, frame_number, frame_pivot, frozen, local_grid, size_of
 
 Ints32 = npt.NDArray[np.int32]

@@ -15,11 +15,10 @@ from hitplanes.planes.common.backend import LruCache, jit_is_on, kernels_of
 from hitplanes.planes.common.checks import InputError, Ints, choice, integer, kind_of, shown, suggestion, within
 from hitplanes.planes.common.limits import HALF, MASK_SIDE_MAX, PATTERN_CACHE_BYTES, PELLETS_MAX, REACH_MAX, SUB
 from hitplanes.planes.common.tables import Flag, Mask, Number, Numbers, Optional, Rows, Value, Whole, Word, typed
-from hitplanes.planes.grid import rasterize, turns
+from hitplanes.planes.grid import rasterize
 from hitplanes.planes.grid.fixed_point import ONE, all_quarters, pixel, quarters, snap, turned, turned_to, unit_of
-from hitplanes.planes.grid.rasterize import disc, polygon, ring
+from hitplanes.planes.grid.rasterize import Edges, disc, edges_of, polygon, ring
 from hitplanes.planes.grid.spans import RowRuns, Spans
-from hitplanes.planes.grid.turns import Edges, edges_of
 from hitplanes.planes.scene.scene import Scene
 from hitplanes.planes.scene.sprite import Sprite, fits, frame_pivot, rows_of
 from hitplanes.planes.scene.variants import Transform, variant_of
@@ -331,7 +330,7 @@ class Stencil(AreaWeapon):
         side = 2 * -(-self.reach_256 // SUB) + 3
         if not fits(side, side):
             return None
-        runs: RowRuns = kernels_of(turns).turned_runs(self._edges, *all_quarters(direction))
+        runs: RowRuns = kernels_of(rasterize).turned_runs(self._edges, *all_quarters(direction))
         return runs
 
 
