@@ -103,8 +103,8 @@ def test_a_line_that_is_none_takes_nothing_from_those_before(tmp_path: Path) -> 
     scene = load_scene(tmp_path / "gate")
     shots = [{"weapon": "pistol", "at": list(AT), "accept": [], "blocked_by": ["wall"]} for _ in range(99)]
     lines = [json.dumps(shot).encode() for shot in shots]
-    salvo, error = ShotReader(scene, weapons_of(scene), "shots.jsonl").read([*lines, b"{}"], 0)
-    assert error is not None and salvo.blocked_by.tolist() == [4] * 99 and salvo.accept.tolist() == [0] * 99
+    requests, error = ShotReader(scene, weapons_of(scene), "shots.jsonl").read([*lines, b"{}"], 0)
+    assert error is not None and [(request.blocked_by, request.accept) for request in requests] == [(4, 0)] * 99
 
 
 def test_shots_of_a_batch_are_blocked_each_by_its_own() -> None:

@@ -139,10 +139,10 @@ def test_usual_lines_are_read_together_and_an_unusual_one_only_with_its_neighbou
     shots: list[Any] = [{"weapon": "point", "at": [i, i], "accept": ["target"], "exclude": [3]} for i in range(256)]
     reader = shot_log.ShotReader(scene, weapons, "log")
     bodies = [json.dumps(shot).encode() for shot in shots]
-    assert reader.read(bodies, 0)[0].number.tolist() == list(range(256)) and not read
+    assert [request.shot for request in reader.read(bodies, 0)[0]] == list(range(256)) and not read
     bodies[77] += b" "
-    salvo, error = reader.read(bodies, 0)
-    assert salvo.number.tolist() == list(range(256)) and error is None and sum(read) == shot_log.FEW
+    requests, error = reader.read(bodies, 0)
+    assert [request.shot for request in requests] == list(range(256)) and error is None and sum(read) == shot_log.FEW
 
 
 def test_the_first_line_tells_what_was_fired_at_and_names_objects(tmp_path: Path) -> None:

@@ -5,17 +5,14 @@ from __future__ import annotations
 import json
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from hitplanes.planes.bits.bit_rows import Words
-from hitplanes.planes.common.checks import Floats, InputError, Ints, choice, integer, within
+from hitplanes.planes.common.checks import InputError, choice, integer, within
 from hitplanes.planes.common.limits import ALL, IDS_MAX, POSITION_MAX, SEED_MAX, SUB
 from hitplanes.planes.common.tables import (
     Either,
@@ -32,7 +29,6 @@ from hitplanes.planes.common.tables import (
 )
 from hitplanes.planes.files.png import possible
 from hitplanes.planes.grid.fixed_point import snap
-from hitplanes.planes.grid.spans import Columns
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
@@ -62,8 +58,7 @@ SHOT = Keys({
 """Table that validates a shot."""
 
 
-@dataclass(frozen=True)
-class ShotRequest:
+class ShotRequest(NamedTuple):
     """One checked shot. `accept` and `blocked_by` hold category bits, `exclude` ids of owners.
 
     `name` is that of the weapon, or None for a weapon that the shot itself describes.
@@ -71,9 +66,9 @@ class ShotRequest:
 
     name: str | None
     weapon: Weapon
-    at: tuple[float, float]
+    at: Sequence[float]
     aim: float | None = None
-    toward: tuple[float, float] | None = None
+    toward: Sequence[float] | None = None
     accept: int = ALL
     blocked_by: int = ALL
     exclude: tuple[int, ...] = ()
@@ -179,65 +174,30 @@ FEW = 16  # unusual lines are read one by one if there are at most this many; ot
 _decode = json.JSONDecoder(object_pairs_hook=distinct_keys).raw_decode
 
 
-Objects = npt.NDArray[np.object_]
+def calls_of(requests: Sequence[ShotRequest]) -> Iterator[tuple[list[int], Weapon, dict[str, Any]]]:
+    """Group shots that one call of `fire` can fire: by weapon, kind of aim (angle or point), number of excluded owners.
 
-
-@dataclass(frozen=True, eq=False)
-class Salvo(Columns):
-    """Checked shots of any weapons, as columns."""
-
-    weapon: Objects  # (n,)
-    at: Floats  # (n, 2) px
-    aim: Floats  # (n,) degrees
-    toward: Floats  # (n, 2) px; NaN for a shot that has an aim
-    accept: Ints  # (n,) category bits
-    blocked_by: Ints  # (n,) category bits
-    exclude: Objects  # (n,) tuples of the ids of owners
-    seed: Words  # (n,) that selects the random draws, with the number
-    number: Ints  # (n,)
-
-    def groups(self) -> dict[tuple[Weapon, bool, int], Ints]:
-        """Group shots that one call can fire: by weapon, kind of aim (angle or point) and number of excluded owners."""
-        found: dict[tuple[Weapon, bool, int], list[int]] = {}
-        aimed = (~np.isnan(self.toward[:, 0])).tolist()
-        for row, key in enumerate(zip(self.weapon.tolist(), aimed, map(len, self.exclude), strict=True)):
-            found.setdefault(key, []).append(row)
-        return {key: np.array(rows) for key, rows in found.items()}
-
-    def arguments(self, rows: Ints, toward: bool, owners: int) -> dict[str, Any]:
-        """Return the arguments of `fire` beside scene and weapon, for the shots of one group."""
-        return {
-            "at": self.at[rows],
-            "toward" if toward else "aim": self.toward[rows] if toward else self.aim[rows],
-            "accept": self.accept[rows],
-            "blocked_by": self.blocked_by[rows],
-            "exclude": np.array(self.exclude[rows].tolist()) if owners else None,
-            "seed": self.seed[rows],
-            "shot": self.number[rows],
-        }
-
-    @classmethod
-    def of_requests(cls, requests: Sequence[ShotRequest]) -> Salvo:
-        """Return the columns of checked shots."""
-        return cls(
-            column_of([request.weapon for request in requests]),
-            np.array([request.at for request in requests], np.float64).reshape(-1, 2),
-            np.array([request.aim or 0.0 for request in requests], np.float64),
-            np.array([request.toward or NOWHERE for request in requests], np.float64).reshape(-1, 2),
-            np.array([request.accept for request in requests], np.int64),
-            np.array([request.blocked_by for request in requests], np.int64),
-            column_of([request.exclude for request in requests]),
-            np.array([request.seed for request in requests], np.uint64),
-            np.array([request.shot for request in requests], np.int64),
+    Yielded are the places of the shots of a call, their weapon, and the other arguments of `fire`.
+    """
+    found: dict[tuple[Weapon, bool, int], list[int]] = {}
+    for place, request in enumerate(requests):
+        found.setdefault((request.weapon, request.toward is None, len(request.exclude)), []).append(place)
+    for (weapon, by_angle, owners), places in found.items():
+        columns = zip(*(requests[place] for place in places), strict=True)
+        _, _, at, aim, toward, accept, blocked_by, exclude, seed, number = columns
+        yield (
+            places,
+            weapon,
+            {
+                "at": np.array(at, np.float64),
+                "aim" if by_angle else "toward": np.array([angle or 0.0 for angle in aim] if by_angle else toward),
+                "accept": np.array(accept),
+                "blocked_by": np.array(blocked_by),
+                "exclude": np.array(exclude) if owners else None,
+                "seed": np.array(seed, np.uint64),
+                "shot": np.array(number, np.int64),
+            },
         )
-
-
-NOWHERE = (float("nan"), float("nan"))
-
-
-def column_of(values: list[Any]) -> Objects:
-    """Column of Python objects; tuples stay whole."""
-    return np.fromiter(values, np.object_, len(values))
 
 
 def read_lines(log: BinaryIO, count: int) -> list[bytes]:
@@ -270,7 +230,7 @@ class ShotReader:
         """Return the place of a line for errors; `line` counts from 0, the text from 1 as editors do."""
         return f"{self._name} line {line + 1}"
 
-    def read(self, bodies: list[bytes], first: int) -> tuple[Salvo, InputError | None]:
+    def read(self, bodies: list[bytes], first: int) -> tuple[list[ShotRequest], InputError | None]:
         """Check lines without their breaks, of which the first has a number, from 0.
 
         Returned are the shots before the first bad line, and the error of that line or None.
@@ -285,7 +245,7 @@ class ShotReader:
         if error is not None:
             return head, error
         tail, error = self.read(bodies[half:], first + half)
-        return Salvo.joined([head, tail]), error
+        return head + tail, error
 
     def request(self, body: bytes, number: int) -> ShotRequest:
         """Check one line without its break; `number` is that of the line, from 0."""
@@ -293,37 +253,40 @@ class ShotReader:
             data = _parsed(body)
         return request_from_json(data, self.scene, self.weapons, self.place(number), number)
 
-    def _one_by_one(self, bodies: list[bytes], first: int) -> tuple[Salvo, InputError | None]:
+    def _one_by_one(self, bodies: list[bytes], first: int) -> tuple[list[ShotRequest], InputError | None]:
         """Check each line by the rules for a scene's shots, which name the error."""
         requests: list[ShotRequest] = []
         for number, body in enumerate(bodies, first):
             try:
                 requests.append(self.request(body, number))
             except InputError as error:
-                return Salvo.of_requests(requests), error
-        return Salvo.of_requests(requests), None
+                return requests, error
+        return requests, None
 
-    def _together(self, bodies: list[bytes], first: int) -> Salvo:
+    def _together(self, bodies: list[bytes], first: int) -> list[ShotRequest]:
         """Check the types and ranges of whole columns at once; raise any error if a line is unusual."""
         shots = _objects(bodies)
-        toward, aim = [shot.get("toward") for shot in shots], [shot.get("aim") for shot in shots]
-        _usual(all(t is None or a is None for t, a in zip(toward, aim, strict=True)))
-        aimed = np.array([point is not None for point in toward])
-        points = np.full((len(shots), 2), np.nan)
-        points[aimed] = _points([point for point in toward if point is not None])
-        return Salvo(
-            column_of(
-                [self.weapons[gun] if type(gun := shot["weapon"]) is str else weapon_from_json(gun) for shot in shots]
-            ),
-            _points([shot["at"] for shot in shots]),
-            _numbers([0.0 if angle is None else angle for angle in aim], AIM_MAX),
-            points,
-            np.array([self._categories(shot, "accept") for shot in shots], np.int64),
-            np.array([self._categories(shot, "blocked_by") for shot in shots], np.int64),
-            column_of([self._passed_over(shot["exclude"]) if "exclude" in shot else () for shot in shots]),
-            np.array(_whole([shot.get("seed", 0) for shot in shots]), np.uint64),
-            np.array(_whole([shot.get("shot", row) for row, shot in enumerate(shots, first)]), np.int64),
+        guns, at = [shot["weapon"] for shot in shots], [shot["at"] for shot in shots]
+        aim, toward = [shot.get("aim") for shot in shots], [shot.get("toward") for shot in shots]
+        seed, number = (
+            [shot.get("seed", 0) for shot in shots],
+            [shot.get("shot", n) for n, shot in enumerate(shots, first)],
         )
+        _usual(all(t is None or a is None for t, a in zip(toward, aim, strict=True)))
+        _check_points([*at, *(point for point in toward if point is not None)])
+        _check_numbers([angle for angle in aim if angle is not None], AIM_MAX)
+        _usual({type(value) for value in (*seed, *number)} == {int} and min(*seed, *number) >= 0)
+        _usual(max(seed) <= SEED_MAX and max(number) < 2**63)
+        columns = (
+            [gun if type(gun) is str else None for gun in guns],
+            [self.weapons[gun] if type(gun) is str else weapon_from_json(gun) for gun in guns],
+            at, aim, toward,
+            [self._categories(shot, "accept") for shot in shots],
+            [self._categories(shot, "blocked_by") for shot in shots],
+            [self._passed_over(shot["exclude"]) if "exclude" in shot else () for shot in shots],
+            seed, number,
+        )  # fmt: skip
+        return list(map(ShotRequest, *columns))
 
     def _categories(self, shot: dict[str, Any], key: str) -> int:
         if key not in shot:
@@ -376,21 +339,14 @@ def _objects(bodies: list[bytes]) -> list[dict[str, Any]]:
     return shots
 
 
-def _points(values: list[Any]) -> Floats:
+def _check_points(values: list[Any]) -> None:
     _usual({type(value) for value in values} <= {list} and {len(value) for value in values} <= {2})
-    return _numbers(list(chain.from_iterable(values)), POSITION_MAX).reshape(-1, 2)
+    _check_numbers(list(chain.from_iterable(values)), POSITION_MAX)
 
 
-def _numbers(values: list[Any], limit: int) -> Floats:
+def _check_numbers(values: list[Any], limit: int) -> None:
     _usual({type(value) for value in values} <= {int, float})
-    array = np.array(values, np.float64)
-    _usual(bool((np.abs(array) <= limit).all()))
-    return array
-
-
-def _whole(values: list[Any]) -> list[int]:
-    _usual({type(value) for value in values} == {int} and min(values) >= 0)
-    return values
+    _usual(bool((np.abs(np.array(values, np.float64)) <= limit).all()))
 
 
 def _usual(condition: bool) -> None:

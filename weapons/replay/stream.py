@@ -38,7 +38,7 @@ from ..kinds.areas import weapons_of
 from ..kinds.placements import ShotColumns
 from ..rays.contacts import Reason
 from ..rays.ray_hits import RayHits
-from .shot_log import Salvo, ShotReader, body_of, read_lines
+from .shot_log import ShotReader, ShotRequest, body_of, calls_of, read_lines
 
 SECONDS = 0.2  # least time between two drawings, seconds
 BAR = 24  # length of the bar, characters
@@ -410,11 +410,11 @@ def _chunks(lines: BinaryIO) -> Iterator[list[bytes]]:
 def _answer(chunk: list[bytes], reader: ShotReader, part: Part, done: Streamed) -> None:
     """Write the answers to a chunk, up to its first bad line."""
     bodies = [body_of(line) for line in chunk]
-    salvo, error = reader.read(bodies, done.shots)
+    requests, error = reader.read(bodies, done.shots)
     try:
-        answers = _fired(salvo, bodies, reader, done.plan)
+        answers = _fired(requests, bodies, reader, done.plan)
     except InputError:
-        answers, error = _fired_one_by_one(salvo, bodies, reader, done)
+        answers, error = _fired_one_by_one(requests, bodies, reader, done)
     part.write(answers)
     done.shots += len(answers)
     done.size += sum(map(len, chunk[: len(answers)]))
@@ -423,16 +423,15 @@ def _answer(chunk: list[bytes], reader: ShotReader, part: Part, done: Streamed) 
         raise error
 
 
-def _fired(salvo: Salvo, bodies: list[bytes], reader: ShotReader, plan: PlanSum) -> list[bytes]:
-    """Fire shots, grouped by weapon; return a line for each, without its last brace."""
-    sums = [zlib.crc32(body) for body in bodies]
-    numbers = salvo.number.tolist()
-    answers = [b""] * len(salvo)
-    for (weapon, toward, owners), rows in salvo.groups().items():
-        hits = fire(reader.scene, weapon, **salvo.arguments(rows, toward, owners))
+def _fired(requests: list[ShotRequest], bodies: list[bytes], reader: ShotReader, plan: PlanSum) -> list[bytes]:
+    """Fire shots, as many in a call as can be; return a line for each, without its last brace."""
+    answers = [b""] * len(requests)
+    for places, weapon, how in calls_of(requests):
+        hits = fire(reader.scene, weapon, **how)
         plan.add(hits.plan, _asked(hits))
-        for row, answer in zip(rows.tolist(), _answers(hits), strict=True):
-            answers[row] = b'{"shot":%d,"of":"%08x",%b' % (numbers[row], sums[row], answer)
+        for place, answer in zip(places, _answers(hits), strict=True):
+            number, crc = requests[place].shot, zlib.crc32(bodies[place])
+            answers[place] = b'{"shot":%d,"of":"%08x",%b' % (number, crc, answer)
     return answers
 
 
@@ -471,14 +470,14 @@ def _lists(columns: ShotColumns, names: Sequence[str]) -> list[list[float]]:
 
 
 def _fired_one_by_one(
-    salvo: Salvo, bodies: list[bytes], reader: ShotReader, done: Streamed
+    requests: list[ShotRequest], bodies: list[bytes], reader: ShotReader, done: Streamed
 ) -> tuple[list[bytes], InputError | None]:
     """Fire shots one by one up to the first that cannot be fired; return the answers and its error."""
     answers: list[bytes] = []
-    for row, body in enumerate(bodies[: len(salvo)]):
+    for row, request in enumerate(requests):
         try:
             with within(reader.place(done.shots + row)):
-                answers += _fired(salvo.take(slice(row, row + 1)), [body], reader, done.plan)
+                answers += _fired([request], [bodies[row]], reader, done.plan)
         except InputError as error:
             return answers, error
     return answers, None
