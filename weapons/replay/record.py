@@ -56,11 +56,12 @@ from ..kinds.placements import Shots, filter_of
 from ..kinds.weapon import Weapon
 from ..rays.contacts import Reason
 from ..rays.ray_hits import RayHits
+from ..report.differences import Entry, by_path, first_of, key_of, pairs
+from ..report.differences import shown as number_of
+from .shot_log import hash_of
 
 if TYPE_CHECKING:
     from ..fire.call import Fired, Places
-from ..report.differences import Entry, by_path, first_of, key_of, pairs
-from ..report.differences import shown as number_of
 
 FORMAT = "hitplanes-shots/3"
 WITHOUT_CHAIN = "hitplanes-shots/1"  # oldest format, without chain and end
@@ -267,11 +268,6 @@ def result_of(hits: Hits, row: int) -> dict[str, Any]:
     return result if isinstance(hits, RayHits) else {**result, "verdicts": hits.verdict_counts(row)}
 
 
-def hash_of(result: Mapping[str, Any]) -> str:
-    """Return the hash of a result."""
-    return hashlib.sha256(json.dumps(result, sort_keys=True).encode()).hexdigest()[:16]
-
-
 def replay(path: str | Path, scene: Scene | History | Callable[[float | None], Scene]) -> Difference | None:
     """Fire the shots of a record again, and compare the results.
 
@@ -444,8 +440,9 @@ def _first_difference(path: Path, groups: Iterator[list[Recorded]], scene: Any) 
             texts = [f"scene: its content hash is {found}, was {first['scene']}{_at_tick(scene, first.get('tick'))}"]
             changed = changed or Difference(line, first["shot"], (*texts, SAME))
         for entry, result in zip(group, _results(path, present, group), strict=True):
-            if result != entry.data["result"]:
-                texts += first_of(_result_lines(present, entry.data["result"], result))
+            was = entry.data["result"]
+            if result != was:
+                texts += first_of(map(printable, [*_lines(present, was, result)] or by_path("", was, result)))
                 return Difference(entry.line, entry.data["shot"], tuple(texts))
     return changed
 
@@ -505,12 +502,8 @@ def _shots_of(entries: Sequence[Mapping[str, Any]]) -> Shots:
     )
 
 
-def _result_lines(scene: Scene, was: Entry, now: Entry) -> Iterator[str]:
-    """Differences of two results as lines: objects hit, passes, ends of rays, verdicts; else by their paths."""
-    yield from map(printable, [*_lines(scene, was, now)] or by_path("", was, now))  # the order of rows has no words
-
-
 def _lines(scene: Scene, was: Entry, now: Entry) -> Iterator[str]:
+    """Differences of two results as lines: objects hit, passes, ends of rays, verdicts; the order of rows has none."""
     whole = set()
     for row, old, new in pairs(was.get("rows"), now.get("rows"), "round", "object"):
         if old is None or new is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 from collections import Counter
@@ -208,6 +209,11 @@ def read_lines(log: BinaryIO, count: int) -> list[bytes]:
         lines.append(line)
         size += len(line)
     return lines
+
+
+def hash_of(data: object) -> str:
+    """First 16 digits of the SHA-256 of JSON."""
+    return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:16]
 
 
 def body_of(line: bytes) -> bytes:

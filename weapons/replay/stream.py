@@ -8,7 +8,6 @@ Each line of the log gives one line of output, in the same order:
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 import shutil
@@ -38,7 +37,7 @@ from ..kinds.areas import weapons_of
 from ..kinds.placements import ShotColumns
 from ..rays.contacts import Reason
 from ..rays.ray_hits import RayHits
-from .shot_log import ShotReader, ShotRequest, body_of, calls_of, read_lines
+from .shot_log import ShotReader, ShotRequest, body_of, calls_of, hash_of, read_lines
 
 SECONDS = 0.2  # least time between two drawings, seconds
 BAR = 24  # length of the bar, characters
@@ -363,8 +362,8 @@ def _header(scene: Scene, reader: ShotReader) -> bytes:
         "version": version("hitplanes"),
         "scene": scene.content_hash(),
         "name": scene.name,
-        "names": _hash([scene.categories, words]),
-        "weapons": _hash({name: weapon.to_json() for name, weapon in reader.weapons.items()}),
+        "names": hash_of([scene.categories, words]),
+        "weapons": hash_of({name: weapon.to_json() for name, weapon in reader.weapons.items()}),
         "columns": COLUMNS,
         "verdicts": [verdict.name.lower() for verdict in OF_PATTERNS],
         "passes": PASSES,
@@ -373,10 +372,6 @@ def _header(scene: Scene, reader: ShotReader) -> bytes:
         "objects": {item: scene.name_of(item) for item in scene.ids(Role.HITTABLE).tolist()},
     }
     return json.dumps(data, separators=(",", ":")).encode() + b"\n"
-
-
-def _hash(data: object) -> str:
-    return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:16]
 
 
 def _resume(lines: BinaryIO, reader: ShotReader, part: Part, done: Streamed) -> None:
