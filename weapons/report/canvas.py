@@ -52,6 +52,7 @@ present place of an object that has moved, and of what a shot does not see."""
 
 THIN, DASHED = ("other", "shadow"), ("blocked", "now")
 
+PLUS = np.array([(0, 1, 0), (1, 1, 1), (0, 1, 0)], np.uint8)  # a pixel and its four neighbours
 DASH = 5  # length of the dashes of an outline, px
 DARK = (20, 22, 26)  # ground under thin lines, rings and labels
 SHADOW, SHADOW_ALPHA = (12, 14, 18), 170  # ground under the marks of hits, which keeps the gaps between them dark
@@ -192,10 +193,9 @@ class World:
         if left >= right or top >= low:
             return
         inside = enlarged(np.pad(mask, 1)[top - y : low - y + 2, left - x : right - x + 2], factor)
-        core = _core(inside)
-        if kind != "other" and factor > 1:
-            core = _core(core)  # so that it stands out in grey, too
-        border = (inside & ~core)[factor:-factor, factor:-factor]
+        thick = 2 if kind != "other" and factor > 1 else 1  # so that it stands out in grey, too
+        core = cv2.erode(inside.astype(np.uint8), PLUS, iterations=thick)
+        border = (inside & (core == 0))[factor:-factor, factor:-factor]
         if not border.any():
             return
         self.painted.add(f"object {kind}")
@@ -248,12 +248,6 @@ def _frame(world: Image, view: Box, bounds: Sequence[int], factor: int) -> None:
     corners = [(v - low) * factor for v, low in zip(bounds, (view[0], view[1]) * 2, strict=True)]
     x, y, x_max, y_max = np.clip(corners, -factor, max(world.shape) + factor).tolist()
     cv2.rectangle(world, (x - 1, y - 1), (x_max + factor, y_max + factor), (120, 126, 136), 1)
-
-
-def _core(inside: Bools) -> Bools:
-    """Pixels of a set whose four neighbours belong to it."""
-    up, down = np.roll(inside, 1, axis=0), np.roll(inside, -1, axis=0)
-    return np.asarray(inside & up & down & np.roll(inside, 1, axis=1) & np.roll(inside, -1, axis=1))
 
 
 def enlarged(plane: npt.NDArray[Any], factor: int) -> npt.NDArray[Any]:

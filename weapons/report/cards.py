@@ -18,7 +18,7 @@ from . import phrases
 from .canvas import CARD, FAINT, INK, LETTER, LINE, Text, World, clipped
 from .differences import reason
 from .overlay import draw_arrows
-from .phrases import NAME_MAX, fragile, percent, short
+from .phrases import NAME_MAX, counted, fragile, percent, short
 from .symbols import MARKS, tiled_glyph, verdict_mark
 
 CELL, COLUMNS, ROWS = 14, 15, 9
@@ -124,7 +124,8 @@ def shot_card(shot: Mapping[str, Any], number: int, scene: Scene, now: str | Non
     """Card of one shot; for a shot at the past with what it would hit now."""
     rays = shot.get("rays")
     lines = _first_of(_hits(shot) if rays is None else phrases.table(shot), HIT_LINES + 1, "")
-    lines += _at_risk(shot["rows"])
+    risks = {row["name"]: fragile(row, "misses it") for row in shot["rows"]}
+    lines += _first_of([(name, risk) for name, risk in risks.items() if risk is not None], NOT_LINES, " fragile")
     near = None
     if rays is not None:
         near = phrases.missed(shot)
@@ -133,23 +134,17 @@ def shot_card(shot: Mapping[str, Any], number: int, scene: Scene, now: str | Non
     others = shot["why_not"]
     if near is not None:
         own = [e for e in others if e["object"] == shot["nearest_miss"]["object"] and e["reason"] == "missed"]
-        risks = [fragile(e, "hits it") for e in own]
-        lines.append((near[0], "; ".join([near[1], *filter(None, risks)])))
+        lines.append((near[0], "; ".join([near[1], *filter(None, (fragile(e, "hits it") for e in own))])))
         others = [e for e in others if e not in own]
     whys = [(f"not {entry['name']}", _why(entry, rays is not None)) for entry in others]
     lines += _first_of(whys, NOT_LINES, " near it")
     if now is not None:
         lines.append(("the same shot now", now))
-    if "tested" in shot:
-        lines.append([_tested(shot["tested"])])
+    if tested := shot.get("tested"):
+        cells = f", {counted(tested['opened'], 'cell')} opened" if tested["opened"] else ""
+        lines.append([f"tested {len(tested['objects'])} of {tested['of']} objects and occluders by pixels{cells}"])
     alone = rays[0] if rays is not None and len(rays) == 1 else None
     return Card(number, shot["weapon"], _fired(shot), shot["verdicts"], inset_of(shot, scene), lines, alone)
-
-
-def _at_risk(rows: Sequence[Mapping[str, Any]]) -> list[Sequence[str]]:
-    """Lines about objects that a shift of one pixel would miss."""
-    risks = {row["name"]: fragile(row, "misses it") for row in rows}
-    return _first_of([(name, risk) for name, risk in risks.items() if risk is not None], NOT_LINES, " fragile")
 
 
 def _why(entry: Mapping[str, Any], of_ray: bool) -> str:
@@ -206,13 +201,6 @@ def batch_cards(report: Mapping[str, Any]) -> list[Card]:
     if batch["heat"]["beyond"]:
         lines.append([f"{batch['heat']['beyond']} samples beyond the picture"])
     return [Card(None, ", ".join(report["weapons"]), total, batch["verdicts"], None, lines)]
-
-
-def _tested(tested: Mapping[str, Any]) -> str:
-    """Number of objects and occluders that a shot was tested against, of how many, in words."""
-    opened = tested["opened"]
-    cells = f", {opened} cell{'s' if opened > 1 else ''} opened" if opened else ""
-    return f"tested {len(tested['objects'])} of {tested['of']} objects and occluders by pixels{cells}"
 
 
 def _first_of(lines: Sequence[Sequence[str]], most: int, what: str) -> list[Sequence[str]]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import difflib
 import itertools
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from hitplanes.planes.common.checks import printable
@@ -228,13 +228,17 @@ def differences(expected: Entry, got: Entry) -> list[str]:
 
 def decisive(report: Entry) -> dict[str, Any]:
     """Copy of a report without the keys that equality leaves out."""
-    kept = _without(report, "report")
-    for key in ("scene", "batch"):
-        if isinstance(kept.get(key), dict):
-            kept[key] = _without(kept[key], key)
+    kept: dict[str, Any] = _without(dict(report), ABOUT["report"])
+    for key in kept.keys() & {"scene", "batch"}:
+        kept[key] = _without(kept[key], ABOUT[key])
     if isinstance(kept.get("shots"), list | tuple):
-        kept["shots"] = [_without(shot, "shot") if isinstance(shot, dict) else shot for shot in kept["shots"]]
+        kept["shots"] = [_without(shot, ABOUT["shot"]) for shot in kept["shots"]]
     return kept
+
+
+def _without(part: Any, keys: Sequence[str]) -> Any:
+    """Copy of an object without some of its keys; any other value as it is."""
+    return {key: v for key, v in part.items() if key not in keys} if isinstance(part, dict) else part
 
 
 Words = Callable[[Entry, Entry], list[str] | None]
@@ -315,13 +319,10 @@ def _common(was: Any, now: Any) -> tuple[Any, Any]:
 
 def _chief(shot: Entry) -> dict[str, Any]:
     """Copy of a shot without the keys that follow from the rest."""
-    chief = {key: value for key, value in shot.items() if key not in SHOT_DERIVED}
+    chief: dict[str, Any] = _without(shot, SHOT_DERIVED)
     for part in ("rows", "why_not"):
         if isinstance(shot.get(part), list | tuple):
-            chief[part] = [
-                {k: v for k, v in row.items() if k not in ROW_DERIVED} if isinstance(row, dict) else row
-                for row in shot[part]
-            ]
+            chief[part] = [_without(row, ROW_DERIVED) for row in shot[part]]
     return chief
 
 
@@ -423,7 +424,7 @@ def _batch(was: Entry, now: Entry) -> list[str] | None:
     """Lines about a batch; totals and heat only if nothing else has changed."""
     before, after = was["batch"], now["batch"]
     words: dict[str, Words] = {"rows": lambda *_: _batch_rows(before, after), "verdicts": _verdicts}
-    rest = [{key: v for key, v in batch.items() if key not in BATCH_DERIVED} for batch in (before, after)]
+    rest = [_without(batch, BATCH_DERIVED) for batch in (before, after)]
     return [f"batch: {line}" for line in _lines_of(rest[0], rest[1], words) or _lines_of(before, after, {})]
 
 
@@ -511,10 +512,6 @@ def _fields(was: Entry, now: Entry, keys: Iterable[str]) -> list[str]:
         elif not same(before, after):
             phrases.append(f"{key} {shown(after)}, was {shown(before)}")
     return phrases
-
-
-def _without(part: Entry, kind: str) -> dict[str, Any]:
-    return {key: value for key, value in part.items() if key not in ABOUT[kind]}
 
 
 def _form_of(report: Entry) -> str:

@@ -62,7 +62,11 @@ def picture_of_report(report: Mapping[str, Any], scene: Scene, *, text: bool = T
     InputError
         If it is not a report, or the scene is not that of the report.
     """
-    _check(report, scene)
+    if not isinstance(report, Mapping):
+        raise InputError(f"report: expected one, as report_of makes it, got {shown(report)}")
+    Const(FORMAT).check("report: format", report.get("format"))
+    if not isinstance(scene, Scene):
+        raise InputError(f"scene: expected a Scene, got {kind_of(scene)}")
     text = flag("text", text)
     if scene.content_hash() != report["scene"]["hash"]:
         raise InputError(f"scene: expected hash {report['scene']['hash']}, got {scene.content_hash()}: it has changed")
@@ -84,15 +88,6 @@ def picture_of_report(report: Mapping[str, Any], scene: Scene, *, text: bool = T
     if text:
         draw_texts(page, texts)
     return page
-
-
-def _check(report: object, scene: object) -> None:
-    """Refuse what is no report, and what is no scene."""
-    if not isinstance(report, Mapping):
-        raise InputError(f"report: expected one, as report_of makes it, got {shown(report)}")
-    Const(FORMAT).check("report: format", report.get("format"))
-    if not isinstance(scene, Scene):
-        raise InputError(f"scene: expected a Scene, got {kind_of(scene)}")
 
 
 def _names(world: World, report: Mapping[str, Any], scene: Scene) -> list[Text]:
@@ -169,17 +164,13 @@ def picture_of_difference(
     sides.append((_difference(got, scenes[1], kinds, view, factor), []))
     painted = worlds[0].painted | worlds[1].painted
     wide = sides[0][0].shape[1] + 2 * EDGE
-    page, texts = _page(sides, _legends(painted, counts, wide), differences(expected, got))
+    verdicts = [Entry(verdict, verdict_mark(verdict)) for verdict in reversed(MARKS) if verdict in painted]
+    kept = [Entry(f"{name}: {n}", verdict_mark(LOOKS[name])) for name, n in reversed(counts.items()) if n]
+    legends = [Legend([*verdicts, *sign_entries(painted)], 2 * (wide - EDGE)), Legend(kept, wide)]
+    page, texts = _page(sides, legends, differences(expected, got))
     if text:
         draw_texts(page, texts)
     return page
-
-
-def _legends(painted: Set[str], counts: dict[str, int], wide: int) -> list[Legend]:
-    """Legend of the first two pictures, and legend with the counts of the third."""
-    verdicts = [Entry(verdict, verdict_mark(verdict)) for verdict in reversed(MARKS) if verdict in painted]
-    kept = [Entry(f"{name}: {n}", verdict_mark(LOOKS[name])) for name, n in reversed(counts.items()) if n]
-    return [Legend([*verdicts, *sign_entries(painted)], 2 * (wide - EDGE)), Legend(kept, wide)]
 
 
 def compared_pixels(expected: Mapping[str, Any], got: Mapping[str, Any], view: Box) -> dict[str, Bools]:

@@ -21,7 +21,7 @@ from hitplanes.planes.scene.history import PastScene
 from hitplanes.planes.scene.objects import Role
 from hitplanes.planes.scene.scene import Scene
 
-from ..explain.samples import Samples, detail_of
+from ..explain.samples import detail_of
 from ..fire.call import fired as fire_checked
 from ..fire.hits import BEFORE, HitRow, Hits
 from ..fire.spans import context_of
@@ -352,13 +352,14 @@ def _shot(scene: Scene, hits: Hits, weapon: str, row: int) -> dict[str, Any]:
     accept, blocked_by = int(shots.accept[row]), int(shots.blocked_by[row])
     owners = [owner for owner in shots.exclude[row].tolist() if owner >= 0]
     margins, samples = _margins(hits, row), hits.samples_at(row)
+    cosine, sine = shots.direction[row].tolist()
     sight = not isinstance(hits, RayHits) and parts_of(hits.weapon)[2].line_of_sight is not None
     return {
         "shot": int(shots.number[row]),
         "weapon": weapon,
         "at": (shots.at_256[row] / SUB).tolist(),
         "at_xy": pixel(shots.at_256[row]).tolist(),
-        "aim": _degrees(hits, row),
+        "aim": round(math.degrees(math.atan2(sine, cosine)), 6) + 0.0 if is_directed(hits.weapon) else None,
         "seed": int(shots.seed[row]),
         "accept": None if accept == ALL else scene.category_names(accept),
         "blocked_by": None if blocked_by == ALL else scene.category_names(blocked_by),
@@ -378,7 +379,11 @@ def _shot(scene: Scene, hits: Hits, weapon: str, row: int) -> dict[str, Any]:
             }
             for entry in hits.blockers(row)
         ],
-        "samples": _sample_runs(samples),
+        "samples": {  # each pixel once, under its strongest verdict
+            verdict.name.lower(): _runs_of(samples.xy[samples.verdict == verdict])
+            for verdict in Verdict
+            if (samples.verdict == verdict).any()
+        },
         **({"sheltered": _runs_of(samples.xy[samples.sheltered])} if sight else {}),
         "plan": hits.plan.to_dict(),
         **(rays_json(scene, hits, row) if isinstance(hits, RayHits) else {}),
@@ -436,12 +441,6 @@ def _rows(scene: Scene, hits: Hits, shot: int, margins: Mapping[int, dict[str, A
     ]
 
 
-def _sample_runs(samples: Samples) -> dict[str, list[list[int]]]:
-    """Runs of the pixels of each verdict that occurs, each pixel once under its strongest verdict."""
-    of = {verdict.name.lower(): samples.xy[samples.verdict == verdict] for verdict in Verdict}
-    return {name: _runs_of(xy) for name, xy in of.items() if len(xy)}
-
-
 def _runs_of(xy: Ints) -> list[list[int]]:
     """Runs [y, x_first, x_last] of pixels (n, 2), each once."""
     x, y = xy.T
@@ -488,11 +487,3 @@ def _objects(scene: Scene, rows: list[list[int]]) -> list[dict[str, Any]]:
         for item, own in of.items()
     ]
     return sorted(entries, key=lambda entry: (-entry["shots"], -entry["pixels"], entry["object"]))
-
-
-def _degrees(hits: Hits, row: int) -> float | None:
-    """Aim of a shot, rounded to a millionth of a degree; None if its weapon has no direction."""
-    if not is_directed(hits.weapon):
-        return None
-    c, s = hits.shots.direction[row].tolist()
-    return round(math.degrees(math.atan2(s, c)), 6) + 0.0
