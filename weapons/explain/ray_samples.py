@@ -341,11 +341,13 @@ def _gaps(detail: RayDetail, objects: list[int], bounds: Box | None, most: float
         if not len(spans):
             continue
         runs = squares(np.stack([spans.x_first, spans.y, spans.x_last, spans.y], axis=1), origin)
-        near = [(*_nearest(*gap(begin[ray], end[ray], runs)), ray) for ray in range(len(rays))]
-        distance, from_xy, to_xy, ray = min(near, key=lambda one: (one[0], one[3]))
+        gaps = [gap(begin[ray], end[ray], runs) for ray in range(len(rays))]
+        ray = int(np.argmin([distances.min() for distances, _, _ in gaps]))
+        nearest = gaps[ray][0].argmin()
+        distance, from_xy, to_xy = (column[nearest] for column in gaps[ray])
         if distance <= limit:
             at, to = ((point + origin).tolist() for point in (from_xy, to_xy))
-            found[objects[place]] = max(distance - wide, 0.0), ray, (at[0], at[1]), (to[0], to[1])
+            found[objects[place]] = max(float(distance) - wide, 0.0), ray, (at[0], at[1]), (to[0], to[1])
             limit = distance if most is None else limit
     return found
 
@@ -353,11 +355,6 @@ def _gaps(detail: RayDetail, objects: list[int], bounds: Box | None, most: float
 def squares(boxes_xyxy: Ints, origin: Ints) -> Floats:
     """Boxes of pixels as closed boxes of their pixel squares, relative to an origin."""
     return np.asarray(boxes_xyxy - np.concatenate([origin, origin]) + np.array([-0.5, -0.5, 0.5, 0.5]))
-
-
-def _nearest(distance: Floats, from_xy: Floats, to_xy: Floats) -> tuple[float, Floats, Floats]:
-    row = int(np.argmin(distance))
-    return float(distance[row]), from_xy[row], to_xy[row]
 
 
 def gap(begin: Floats, end: Floats, boxes_xyxy: Floats) -> tuple[Floats, Floats, Floats]:

@@ -22,7 +22,7 @@ from hitplanes.planes.common.backend import kernels_of
 from hitplanes.planes.common.checks import Bools, Ints
 from hitplanes.planes.common.limits import CHUNK_SAMPLES, HALF, SUB
 from hitplanes.planes.grid.rasterize import DIAGONAL, Lines
-from hitplanes.planes.grid.spans import Box, Columns, clipped, each_pixel, pieces, sorted_once
+from hitplanes.planes.grid.spans import Box, Columns, clipped, each_pixel, meets, pieces, sorted_once
 
 from ..fire.prefilter import Filters, filters_of, refused, refused_by
 from ..kinds.placements import Shots
@@ -93,14 +93,12 @@ def verdicts_of_rays(walk: Walk, filters: Filters | None, bounds: Box | None) ->
 
 def cells_in(lines: Lines, box_xyxy: Ints, ends: Terminations | None = None) -> Ints:
     """Number of cells (n,) of lines in inclusive boxes (n, 4), each in its own; with ends only those before them."""
-    kept = np.flatnonzero((box_xyxy[:, :2] <= box_xyxy[:, 2:]).all(axis=1))
-    if len(kept) < len(lines) or not len(lines):
-        count = np.zeros(len(lines), np.int64)
-        if len(kept):
-            count[kept] = cells_in(lines.take(kept), box_xyxy[kept], None if ends is None else ends.take(kept))
-        return count
-    if lines.radius:
-        return _wide_cells_in(lines, box_xyxy, ends)
+    count = (_wide_cells_in if lines.radius else _thin_cells_in)(lines, box_xyxy, ends)
+    return np.where((box_xyxy[:, :2] <= box_xyxy[:, 2:]).all(axis=1), count, 0)
+
+
+def _thin_cells_in(lines: Lines, box_xyxy: Ints, ends: Terminations | None) -> Ints:
+    """`cells_in` of thin lines, in boxes that are not empty."""
     borders = Borders.of(lines)
     time = borders.last if ends is None else np.minimum(ends.time - 1, borders.last)
     cut = np.flatnonzero((box_xyxy != lines.box_xyxy).any(axis=1))
@@ -276,17 +274,10 @@ def _met(walk: Walk, filters: Filters | None, bounds: Box | None) -> Ints:
     hits = sorted_once(key_of_cells(rays[cells.ray[cells.pair]], cells.x, cells.y))
     ended = rays[stopped[rays]]
     stops = key_of_cells(ended, ends.x[ended], ends.y[ended])
-    for row, keys in enumerate((hits, _absent(stops, hits), _absent(_absent(skipped, hits), stops))):
+    stops, skipped = (np.setdiff1d(keys, hits, assume_unique=True) for keys in (stops, skipped))
+    for row, keys in enumerate((hits, stops, np.setdiff1d(skipped, stops, assume_unique=True))):
         counts[row, rays] = np.bincount(keys >> 2 * REACH_BITS, minlength=n)[rays]
     return counts.T
-
-
-def _absent(keys: Ints, known: Ints) -> Ints:
-    """Those of the keys that are not among other ones, which are sorted."""
-    if not len(known):
-        return keys
-    near = known[np.minimum(np.searchsorted(known, keys), len(known) - 1)]
-    return np.asarray(keys[near != keys])
 
 
 def _several_in_cells(walk: Walk) -> Bools:
@@ -295,8 +286,7 @@ def _several_in_cells(walk: Walk) -> Bools:
     ray, x, y = hit.ray, ends.x[hit.ray], ends.y[hit.ray]
     box = walk.stack.box_xyxy[hit.rank] - np.tile(walk.rays.origin_xy[ray], 2)
     several = np.zeros(len(lines), np.bool_)
-    held = (box[:, 0] <= x) & (x <= box[:, 2]) & (box[:, 1] <= y) & (y <= box[:, 3])
-    several[ray[held & (ends.reason[ray] == Reason.OCCLUDER)]] = True
+    several[ray[meets(box, np.stack([x, y, x, y], axis=1)) & (ends.reason[ray] == Reason.OCCLUDER)]] = True
     scale, behind = lines.scale[ray], 4.0 * ray  # each ray begins after the one before has ended
     near = behind + hit.entry / scale - SLACK
     far = behind + np.minimum(times_in(lines, ray, box)[1] / scale, 2) + SLACK

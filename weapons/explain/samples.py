@@ -73,8 +73,6 @@ class Blocked(NamedTuple):
     behind: tuple[Behind, ...]
 
 
-RUN = ("y", "x_first", "x_last")
-
 REASONS = ("missed", "category", "excluded", "behind", "outside", "inside", "tunnelled", "budget")
 
 
@@ -175,8 +173,7 @@ def united(parts: Iterable[tuple[int, Spans]]) -> dict[int, Spans]:
     for item, spans in parts:
         found.setdefault(item, []).append(spans)
     return {
-        item: Spans.from_runs(*(np.concatenate([getattr(one, name) for one in own]) for name in RUN))
-        for item, own in sorted(found.items())
+        item: Spans.from_runs(*np.concatenate([spans.runs() for spans in own]).T) for item, own in sorted(found.items())
     }
 
 
@@ -270,8 +267,7 @@ def detail_of(context: QueryContext, weapon: Weapon, shots: Shots) -> Detail:
     """Walk every sample of shots and record its verdict and the items that decided it."""
     stack, bounds, blockers = context.stack, context.bounds, context.blockers
     placements = placements_for(weapon, shots)
-    if int(placements.count.sum()) > DETAIL_SAMPLES_MAX:
-        got = int(placements.count.sum())
+    if (got := int(placements.count.sum())) > DETAIL_SAMPLES_MAX:
         raise InputError(f"samples: expected a shot of at most {DETAIL_SAMPLES_MAX} to tell one by one, got {got}")
     runs = placements.table.laid(placements.pattern, placements.xy[:, 0], placements.xy[:, 1], placements.boxes)
     run, x = each_pixel(runs.x_first, runs.x_last)
