@@ -26,6 +26,7 @@ from hitplanes.planes.scene.render import plane_objects
 from hitplanes.planes.scene.scene import Scene
 
 from ..report.canvas import enlarged
+from ..report.differences import first_of
 from ..report.phrases import counted
 from ..report.picture import picture_of_difference, picture_of_report
 from .file import (
@@ -418,11 +419,9 @@ def settle(call: Call, hits: object, planes: Mapping[str, object]) -> Outcome:
         got.write(call.base, changed)
         return Outcome("updated")
     failure, look = _show(call, lines, expected, got, changed or Unlike())
-    more = [f"and {len(lines) - LINES_MAX} more"] if len(lines) > LINES_MAX else []
     accept = ["accept: run again with --hits-update"] if ours else []
-    if changed is not None and not changed.hits:
-        more.append("the hits are the same")
-    message = [*lines[:LINES_MAX], *more, f"golden: {failure['golden']}", f"look: {look}", *accept]
+    same = ["the hits are the same"] if changed is not None and not changed.hits else []
+    message = [*first_of(lines, LINES_MAX), *same, f"golden: {failure['golden']}", f"look: {look}", *accept]
     return Outcome("failed", "\n".join(message), failure)
 
 

@@ -76,11 +76,11 @@ def text_of_json(value: Any) -> str:
     return json.dumps(value, sort_keys=True, default=repr)
 
 
-def first_of(lines: Iterable[str]) -> list[str]:
-    """First LINES_MAX lines, and the number of the others."""
+def first_of(lines: Iterable[str], most: int = LINES_MAX) -> list[str]:
+    """First lines, and the number of the others."""
     every = list(lines)
-    more = len(every) - LINES_MAX
-    return every if more <= 0 else [*every[:LINES_MAX], f"and {more} more"]
+    more = len(every) - most
+    return every if more <= 0 else [*every[:most], f"and {more} more"]
 
 
 def shown(value: Any) -> str:

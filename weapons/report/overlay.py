@@ -50,7 +50,10 @@ class Overlay:
     def shot(self, shot: Mapping[str, Any], number: int) -> None:
         """Draw a cross on the pixel of a shot and its number in a disc with a line to it; an arrow if out of view."""
         height, width = self.image.shape[:2]
-        x, y = self._start(shot)
+        if "rays" in shot:  # they start anywhere in a pixel
+            x, y = np.floor(self.world.placed(np.array(shot["at"]))).astype(np.int64).tolist()
+        else:
+            x, y = (v + self.factor // 2 for v in self._at(*shot["at_xy"]))
         inside = 0 <= x < width and 0 <= y < height
         if not inside:
             x, y = min(max(x, 0), width - 1), min(max(y, 0), height - 1)
@@ -66,14 +69,6 @@ class Overlay:
         self._take(bx - SHOT_BADGE, by - SHOT_BADGE, bx + SHOT_BADGE + 1, by + SHOT_BADGE + 1)
         label = str(number)
         self.texts.append(Text(bx - 4 * len(label), by + 4, label, WHITE, bold=True))
-
-    def _start(self, shot: Mapping[str, Any]) -> tuple[int, int]:
-        """Start of a shot in the picture: the middle of its pixel, or the start of its rays."""
-        if "rays" in shot:
-            x, y = np.floor(self.world.placed(np.array(shot["at"]))).astype(np.int64).tolist()
-            return x, y
-        x, y = self._at(*shot["at_xy"])
-        return x + self.factor // 2, y + self.factor // 2
 
     def names(self, shots: Sequence[Mapping[str, Any]], scene: Scene) -> None:
         """Name the objects that were hit, most pixels first."""

@@ -38,7 +38,7 @@ from .canvas import (
     sign_entries,
 )
 from .cards import batch_cards, hit_now, shot_card
-from .differences import differences
+from .differences import differences, first_of
 from .overlay import OF_RAYS, Overlay, draw_present, draw_rays
 from .report import FORMAT
 from .symbols import MARKS, verdict_mark
@@ -258,9 +258,7 @@ def _page(
     high, wide = sides[0][0].shape[:2]
     width = 2 * EDGE + 3 * wide + 2 * GAP
     below = TOP + high + 14 + max(legend.height for legend in legends)
-    lines = list(words[:LINES_MAX]) or ["no difference"]
-    if len(words) > LINES_MAX:
-        lines.append(f"and {len(words) - LINES_MAX} more")
+    lines = first_of(words, LINES_MAX) or ["no difference"]
     page = np.full((below + LINE * len(lines) + 12, width, 3), PAGE_GROUND, np.uint8)
     texts = []
     for i, ((world, labels), title) in enumerate(zip(sides, ("expected", "got", "difference"), strict=True)):

@@ -37,12 +37,6 @@ SLACK = 2.0**-20
 2**-25 of the radius."""
 
 
-def _boxes(targets: Sequence[Target]) -> Ints:
-    """Return the first and last pixel centres (M, 4) of masks."""
-    boxes = [[x, y, x + mask.shape[1] - 1, y + mask.shape[0] - 1] for _, mask, (x, y) in targets]
-    return PX * np.array(boxes, np.int64).reshape(-1, 4)
-
-
 def _between(target: Target, low: Ints, high: Ints) -> Ints:
     """Return the pixels (K, 2) of a mask whose centres lie between two corners."""
     _, mask, corner = target
@@ -205,7 +199,8 @@ def _nearby(flights: Flights, targets: Sequence[Target], velocity_256: Ints) -> 
     These are all pixels near its start, and elsewhere those at a rim: a disc that reaches a pixel with eight neighbours
     has reached one of them before.
     """
-    box, rims = _boxes(targets), [_rim(target) for target in targets]
+    corners = [[x, y, x + mask.shape[1] - 1, y + mask.shape[0] - 1] for _, mask, (x, y) in targets]
+    box, rims = PX * np.array(corners, np.int64).reshape(-1, 4), [_rim(target) for target in targets]
     reach = max(flights.radius_256, HALF)
     for number, (start, step) in enumerate(zip(flights.start_256, flights.step_256, strict=True)):
         relative = step - velocity_256.reshape(-1, 2)
