@@ -7,7 +7,7 @@ import html
 import json
 import os
 import re
-from collections.abc import Generator, Iterable, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
@@ -52,7 +52,6 @@ DIM = 140  # brightness of pixels that do not differ, of 255
 PICTURE_CLOSE, PLANE_CLOSE = 80, 40  # width of the part that a close view shows of a picture and of a plane, px
 CLOSE_SIDE = 320  # approximate width at which a close view is drawn, px
 GAP = 8  # gap between close views, px
-PLANE = "plane-{}-"  # prefix of the files of a plane, with its number, as its name may not be valid in a file name
 COMPARED = "hits.png"  # picture of the expected hits and those got, side by side
 
 HASH = np.array([73_856_093, 19_349_663, 83_492_791], np.uint64)
@@ -60,46 +59,39 @@ HASH = np.array([73_856_093, 19_349_663, 83_492_791], np.uint64)
 
 Plane = npt.NDArray[Any]
 
+Write = Callable[[str, Image], None]  # writes a picture, given the name of its file
 Row = list[tuple[str, str]]  # caption and file of pictures that are shown side by side
 SIDE_BY_SIDE, TEXTLESS = "hits: expected, got, difference", " (goldens have no text)"
 
 
-def pictures_of(changed: Unlike) -> list[str]:
-    """Return the names of all files that `draw_difference` may write."""
-    planes = [f"{PLANE.format(i)}{part}.png" for i in range(len(changed.planes)) for part in ("difference", "crop")]
-    return [COMPARED, "expected.png", "got.png", "difference.png", "crop.png", *planes]
-
-
-def draw_difference(folder: Path, expected: Golden | None, got: Golden, changed: Unlike) -> list[Row]:
+def draw_difference(write: Write, expected: Golden | None, got: Golden, changed: Unlike) -> list[Row]:
     """Write pictures of the expected and the actual hits, and of their difference; return the rows of the page."""
     picture = got.picture
     if picture is None:
         assert got.whole is not None and got.scene is not None  # golden_of has made it
         picture = picture_of_report(got.whole, got.scene, text=False)
-    write_png(folder / "got.png", picture)
+    write("got.png", picture)
     rows: list[Row] = []
     if expected is None or expected.picture is None or got.picture is None:
         pair = [] if expected is None or got.whole is None else reports_of_hits(got.whole, expected.report, got.report)
         if pair and changed.hits:
-            write_png(folder / COMPARED, picture_of_difference(pair[0], pair[1], (got.scene, got.scene)))
+            write(COMPARED, picture_of_difference(pair[0], pair[1], (got.scene, got.scene)))
             rows += [[(SIDE_BY_SIDE, COMPARED)]]
         return [*rows, [(f"got{TEXTLESS}", "got.png")]]
-    write_png(folder / "expected.png", expected.picture)
+    write("expected.png", expected.picture)
     if changed.hits:
         scenes = scene_of(expected), got.scene
-        write_png(folder / COMPARED, picture_of_difference(expected.report, got.report, scenes))
+        write(COMPARED, picture_of_difference(expected.report, got.report, scenes))
         rows += [[(SIDE_BY_SIDE, COMPARED)]]
     rows += [[(f"expected{TEXTLESS}", "expected.png"), (f"got{TEXTLESS}", "got.png")]]
     if changed.picture:
         was, now = opaque(expected.picture), opaque(got.picture)
         rows[-1] += [("difference", "difference.png")]
-        rows += [_close(folder, "", was, now, _differ(was, now), PICTURE_CLOSE)]
+        rows += [_close(write, "", was, now, _differ(was, now), PICTURE_CLOSE)]
     for number, name in enumerate(name for name in changed.planes if name in expected.planes and name in got.planes):
         was, now = expected.planes[name], got.planes[name]
-        differ = _differ(was, now)
-        rows += [
-            _close(folder, PLANE.format(number), coloured(was), coloured(now), differ, PLANE_CLOSE, f"plane {name}: ")
-        ]
+        prefix, differ = f"plane-{number}-", _differ(was, now)  # the name may not be valid in that of a file
+        rows += [_close(write, prefix, coloured(was), coloured(now), differ, PLANE_CLOSE, f"plane {name}: ")]
     return rows
 
 
@@ -153,10 +145,10 @@ def _differ(was: Plane, now: Plane) -> Bools:
     return out
 
 
-def _close(folder: Path, prefix: str, was: Image, now: Image, differ: Bools, side: int, caption: str = "") -> Row:
+def _close(write: Write, prefix: str, was: Image, now: Image, differ: Bools, side: int, caption: str = "") -> Row:
     """Write a picture of the difference, and enlarged views of both pictures and of it around the first pixel."""
     difference = picture_of_pixels(now, differ)
-    write_png(folder / f"{prefix}difference.png", difference)
+    write(f"{prefix}difference.png", difference)
     y, x = (int(v[0]) for v in np.nonzero(differ)) if differ.any() else (0, 0)
     width, height = min(side, differ.shape[1]), min(side * 3 // 4, differ.shape[0])
     left = min(max(x - width // 2, 0), differ.shape[1] - width)
@@ -168,7 +160,7 @@ def _close(folder: Path, prefix: str, was: Image, now: Image, differ: Bools, sid
         part = picture[top : top + height, left : left + width, :3]
         view[: part.shape[0], : part.shape[1]] = part
         views.append(np.pad(enlarged(view, factor), ((0, 0), (0, GAP), (0, 0))))
-    write_png(folder / f"{prefix}crop.png", np.concatenate(views, axis=1)[:, :-GAP])
+    write(f"{prefix}crop.png", np.concatenate(views, axis=1)[:, :-GAP])
     around = f"{caption}around ({x}, {y}), {factor} times: expected, got, difference"
     whole = [(f"{caption}difference", f"{prefix}difference.png")] if caption else []
     return [*whole, (around, f"{prefix}crop.png")]
@@ -436,17 +428,21 @@ def _show(
     if not claimed(folder):
         why = "is there, and not ours: move or remove it" if folder.exists() else "cannot be made"
         return failure, f"nowhere: {printed(folder, call.here)} {why}"
-    texts = {"expected.json": expected, "got.json": got}
+    texts = {"got.json": got} if expected is None else {"expected.json": expected, "got.json": got}
+
+    def write(file: str, picture: Image) -> None:
+        note_files(folder, [f"{name}/{file}"])
+        write_png(folder / name / file, picture)
+
     try:
-        note_files(folder, [f"{name}/{file}" for file in (*texts, *pictures_of(changed))])
+        note_files(folder, [f"{name}/{file}" for file in texts])
         (folder / name).mkdir(exist_ok=True)
         for file, side in texts.items():
-            if side is not None:
-                write_text(folder / name / file, side.text())
-        rows = draw_difference(folder / name, expected, got, changed)
+            write_text(folder / name / file, side.text())
+        rows = draw_difference(write, expected, got, changed)
     except (OSError, InputError) as error:
         return failure, f"nowhere: {error}"
-    failure |= {"folder": name, "texts": [file for file, side in texts.items() if side is not None], "rows": rows}
+    failure |= {"folder": name, "texts": list(texts), "rows": rows}
     return failure, printed(folder / PAGE, call.here)
 
 
