@@ -51,10 +51,7 @@ def heat_of(fired: Sequence[Hits], view_xyxy: Box) -> dict[str, Any]:
     for xy, verdict in _parts(fired):
         seen = (xy >= (x, y)).all(axis=1) & (xy <= (x_max, y_max)).all(axis=1)
         column, row = ((xy[seen] - (x, y)) // cell).T
-        for kind in np.unique(verdict[seen]).tolist():
-            own = verdict[seen] == kind
-            cells, samples = np.unique(row[own] * width + column[own], return_counts=True)
-            counts[kind, cells] += samples
+        np.add.at(counts.reshape(-1), (verdict[seen] * height + row) * width + column, 1)
         beyond += int((~seen).sum())
     runs = {v.name.lower(): _runs(counts[v].reshape(height, width)) for v in OF_PATTERNS if counts[v].any()}
     return {"cell": cell, "origin_xy": [x, y], "beyond": beyond, "counts": runs}

@@ -356,14 +356,14 @@ def _bytes(count: int) -> str:
 def csv_of(study: Json) -> str:
     """Return the study as CSV, with a row for each point."""
     text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(COLUMNS)
+    writer = csv.DictWriter(text, COLUMNS, extrasaction="ignore", lineterminator="\n")
+    writer.writeheader()
     for question in study["questions"]:
         for curve in question["curves"]:
             for point in curve["points"]:
-                flat = {**point, **{f"us_per_shot_{name}": us for name, us in point["us_per_shot"].items()}}
+                us = {f"us_per_shot_{name}": us for name, us in point["us_per_shot"].items()}
                 own = {"question": question["name"], "method": curve["name"], "shots": question["shots"]}
-                writer.writerow([own.get(name, flat.get(name)) for name in COLUMNS])
+                writer.writerow({**point, **us, **own})
     return text.getvalue()
 
 
