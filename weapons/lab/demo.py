@@ -6,7 +6,6 @@ from `BroadPhase.work`, so the same code draws all three structures.
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,7 +26,7 @@ from hitplanes.planes.scene.render import blend
 
 from ..report.canvas import CARD, FAINT, INK, PAGE_GROUND, Entry, Legend, Text, draw_texts
 from ..report.phrases import percent
-from ..report.symbols import MARKS
+from ..report.symbols import MARKS, Color
 
 NO_DITHER = 3  # for OpenCV, unlike its documentation; -1 to 2 put dots on plain areas
 COLORS = 6  # bits of the palette; 64 colours are enough for flat drawings, and make small files
@@ -35,7 +34,7 @@ COLORS = 6  # bits of the palette; 64 colours are enough for flat drawings, and 
 
 def can_write_gif() -> bool:
     """Whether this OpenCV writes GIF files: from 4.12 on, unless it was built without."""
-    return hasattr(cv2, "imwriteanimation") and cv2.haveImageWriter("x.gif")
+    return hasattr(cv2, "imencodeanimation") and cv2.haveImageWriter("x.gif")
 
 
 def write_gif(path: Path, frames: Iterable[Image], milliseconds: int) -> None:
@@ -47,11 +46,10 @@ def write_gif(path: Path, frames: Iterable[Image], milliseconds: int) -> None:
     animation.frames = [cv2.cvtColor(frame, cv2.COLOR_RGB2BGR) for frame in frames]
     animation.durations = [milliseconds] * len(animation.frames)
     flat = [cv2.IMWRITE_GIF_QUALITY, COLORS, cv2.IMWRITE_GIF_DITHER, NO_DITHER, cv2.IMWRITE_GIF_TRANSPARENCY, 0]
-    with tempfile.TemporaryDirectory() as folder:
-        aside = Path(folder) / "aside.gif"
-        if not cv2.imwriteanimation(str(aside), animation, flat):
-            raise InputError(f"output: cannot write {path}: OpenCV {cv2.__version__} did not encode it")
-        write_bytes(path, aside.read_bytes())
+    good, data = cv2.imencodeanimation(".gif", animation, flat)
+    if not good:
+        raise InputError(f"output: cannot write {path}: OpenCV {cv2.__version__} did not encode it")
+    write_bytes(path, data.tobytes())
 
 
 def write_frames(folder: Path, frames: Iterable[Image]) -> None:
@@ -93,7 +91,6 @@ KINDS = {
 }
 """Structures by name, coarser than the fastest so that their cells can be seen."""
 
-Color = tuple[int, int, int]
 FOUND, VISITED = MARKS["hit"][0], MARKS["occluded"][0]
 TESTED, REST, CELL, ON_THE_WAY = (246, 228, 150), (88, 94, 106), (80, 86, 98), (62, 116, 148)
 TINT = 84  # opacity of an opened leaf, of 255
