@@ -407,7 +407,7 @@ def test_a_library_that_fails_is_left_out_of_a_cell(few: None, tmp_path: Path, m
     with_predicates(monkeypatch, named("polygons"))
     monkeypatch.setattr(stability, "of_peer", lambda peer, name: answers if (peer, name) == SHAPELY else None)
     monkeypatch.setattr(stability, "installed", lambda peer: peer == "shapely")
-    monkeypatch.setattr(stability, "version", lambda name: "1")
+    monkeypatch.setattr(stability, "versions", lambda *names: dict.fromkeys(names, "1"))
     study = run_stability(tmp_path / "out", quick=True, stream=io.StringIO())
     assert study.complete and [c.family for c in study.cells if c.failed] == ["huge"]
     assert study.total("shapely").cases == 8 * ROWS

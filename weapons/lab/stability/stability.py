@@ -14,7 +14,6 @@ import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
@@ -27,7 +26,7 @@ from hitplanes.planes.files.png import write_text
 from hitplanes.planes.files.scene_folder import cleared, own_folder
 
 from ...replay.stream import Progress
-from ..peers import PEERS, installed, of_peer
+from ..peers import PEERS, installed, of_peer, versions
 from ..study.study import FAINT, HATCH, INK, PAPER, looking_alike, markdown_table, save_figure
 from .families import FAMILIES
 from .predicates import PREDICATES, Method, Predicate
@@ -262,8 +261,7 @@ def run_stability(folder: Path, seed: int = 0, quick: bool = False, stream: Text
     seed = integer("seed", seed, 0, SEED_MAX)
     folder = path_of("output", folder)
     own_folder(folder, FILES)
-    names = ["hitplanes", "numpy", *(peer for peer in PEERS if installed(peer))]
-    study = Study(seed, quick, {name: version(name) for name in names})
+    study = Study(seed, quick, versions("hitplanes", "numpy", *filter(installed, PEERS)))
     progress = Progress(stream, "decisions")
     try:
         _ask(study, progress, lambda: _keep(study, folder))
