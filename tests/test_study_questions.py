@@ -30,7 +30,7 @@ from hitplanes.weapons.lab.study.methods import (
     velocities_of,
 )
 from hitplanes.weapons.lab.study.questions import movers_question, rays_question, spread_question
-from hitplanes.weapons.lab.study.truth import Flights, first_pixels, flown, impacts, parts_of_discs, touching
+from hitplanes.weapons.lab.study.truth import Flights, flown, impacts, parts_of_discs, touching
 
 ROOT = Path(__file__).parent.parent
 PEERS = ("pymunk", "shapely", "pygame")
@@ -79,7 +79,7 @@ def slow_first(a: np.ndarray, step: np.ndarray, scene: Scene) -> tuple[int, tupl
 @pytest.mark.parametrize("seed", range(3))
 def test_truth_of_rays_is_that_of_fractions_and_of_fire(seed: int) -> None:
     scene, (start, step) = scene_of(seed), segments_of(seed, 60)
-    shot, item, pixel_xy = first_pixels(start, step, targets_of(scene))
+    shot, item, _, pixel_xy = impacts(Flights(start, step, 0), targets_of(scene))
     found = {k: (i, tuple(p)) for k, i, p in zip(shot.tolist(), item.tolist(), pixel_xy.tolist(), strict=True)}
     assert found == {
         k: slow for k, (a, d) in enumerate(zip(start, step, strict=True)) if (slow := slow_first(a, d, scene))
@@ -174,7 +174,7 @@ def test_truth_tells_who_starts_inside() -> None:
     target = [(3, np.ones((1, 1), np.bool_), (5, 7))]
     points = np.array([(5 * SUB + x, 7 * SUB + y) for x in (-129, -128, 0, 128, 129) for y in (0, 128, 129)])
     inside = (np.abs(points - (5 * SUB, 7 * SUB)) <= 128).all(axis=1)
-    assert np.array_equal(first_pixels(points, np.zeros_like(points), target)[0], np.flatnonzero(inside))
+    assert np.array_equal(impacts(Flights(points, np.zeros_like(points), 0), target).flight, np.flatnonzero(inside))
     assert np.array_equal(touching(points, 0, target), inside)
     assert touching(points, 400, target).all() and not touching(points + 600, 400, target).any()
 
@@ -485,7 +485,7 @@ def impact(
 
 def test_of_pixels_entered_at_once_the_upper_is_first() -> None:
     targets = pixels_at((0, 1), (1, 0))
-    assert first_pixels(np.array([(0, 0)]), np.array([(SUB, SUB)]), targets)[1].tolist() == [1]
+    assert impact((0, 0), (SUB, SUB), targets, radius=0)[0] == 1
     assert impact((-SUB, -SUB), (SUB, SUB), targets)[0] == 1
 
 

@@ -387,12 +387,12 @@ def rays_question(scene: Scene, shots: int, seed: int) -> Question:
     length = min(max(1, round(4 * size_of(targets))), LENGTH_MAX)
     start, angle, _ = drawn_places(targets, shots, seed, SUB * length // 2, lambda xy: truth.touching(xy, 0, targets))
     step = ahead(length, angle)
-    shot, item, pixel_xy = truth.first_pixels(start, step, targets)
+    first = truth.impacts(truth.Flights(start, step, 0), targets)
     return Question(
         "rays",
         f"Which object does a ray of {length} px hit first?",
         shots,
-        Decisions.of(shot, item, pixel_xy.astype(np.float64)),
+        Decisions.of(first.flight, first.object, first.pixel_xy.astype(np.float64)),
         "the pixel squares of the masks at full scale, as a step is judged by what is there in the planes; exactly",
         (
             _stepping(alone, start, step, length),

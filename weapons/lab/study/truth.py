@@ -88,48 +88,11 @@ def parts_of_discs(center_xy: Ints, radius: int, targets: Sequence[Target]) -> T
     return Touched.of(found)
 
 
-# Rays
-
-
-def first_pixels(start_256: Ints, step_256: Ints, targets: Sequence[Target]) -> tuple[Ints, Ints, Ints]:
-    """Find the first pixel that each closed segment (start, and vector to its end; up to 2**28) touches.
-
-    The first pixel is the one entered first. Of several entered at once it is the least (y, x), with the front-most
-    object there: targets are given front to back. Returned are the segments (K,) that touch anything, in order, their
-    objects (K,), and their pixels (K, 2).
-    """
-    found = []
-    for shot, near in _nearby(Flights(start_256, step_256, 0), targets, np.zeros((len(targets), 2), np.int64)):
-        time, met = _entries(near.away, step_256[shot])
-        if len(met):
-            first = met[np.lexsort((near.rank[met], near.xy[met, 0], near.xy[met, 1], time))[0]]
-            found.append((shot, targets[near.rank[first]][0], *near.xy[first].tolist()))
-    rows = np.array(found, np.int64).reshape(-1, 4)
-    return rows[:, 0], rows[:, 1], rows[:, 2:]
-
-
-def _entries(away: Ints, step: Ints) -> tuple[Ints, Ints]:
-    """Return when a segment enters squares with centres `away` (K, 2) from its start, and the rows that it touches.
-
-    Times are whole numbers over one scale. A segment and a square touch unless their projections on x, on y or across
-    the segment are apart. The segment enters when it reaches the later of the sides that face it.
-    """
-    low, high = np.minimum(step, 0) - HALF, np.maximum(step, 0) + HALF
-    cross = away[:, 0] * step[1] - away[:, 1] * step[0]
-    apart = ((away < low) | (away > high)).any(axis=1) | (np.abs(cross) > HALF * np.abs(step).sum())
-    met = np.flatnonzero(~apart)
-    times = np.zeros((len(met), 3), np.int64)
-    for axis in np.flatnonzero(step):
-        other = max(abs(int(step[1 - axis])), 1)
-        times[:, axis] = (away[met, axis] * np.sign(step[axis]) - HALF) * other
-    return times.max(axis=1), met
-
-
-# Flying discs
+# Flying discs, and rays, which are those of radius 0
 
 
 class Flights(NamedTuple):
-    """Flying discs of one radius: starts, and steps in a frame, (N, 2)."""
+    """Flying discs of one radius, or rays: starts, and steps in a frame, (N, 2)."""
 
     start_256: Ints
     step_256: Ints
@@ -167,8 +130,8 @@ def flown(speed_256: int, toward_256: Ints) -> Ints:
     return np.array(ends, np.int64).reshape(-1, 2)
 
 
-def impacts(flights: Flights, targets: Sequence[Target], velocity_256: Ints) -> Impacts:
-    """Find the first touch of each disc; coordinates are up to 2**29, all velocities (M, 2) added.
+def impacts(flights: Flights, targets: Sequence[Target], velocity_256: Ints | None = None) -> Impacts:
+    """Find the first touch of each disc; coordinates are up to 2**29, all velocities (M, 2) of moving targets added.
 
     Of several pixels touched at once it is the least (y, x), with the front-most object there: targets are given front
     to back.
@@ -188,12 +151,12 @@ def touching(points_256: Ints, radius_256: int, targets: Sequence[Target]) -> Bo
     """Whether resting discs at points (N, 2) touch any target."""
     resting = Flights(points_256, np.zeros_like(points_256), radius_256)
     inside = np.zeros(len(points_256), np.bool_)
-    for number, near in _nearby(resting, targets, np.zeros((len(targets), 2), np.int64)):
+    for number, near in _nearby(resting, targets, None):
         inside[number] = np.isfinite(_times(near, radius_256)).any()
     return inside
 
 
-def _nearby(flights: Flights, targets: Sequence[Target], velocity_256: Ints) -> Iterator[tuple[int, _Near]]:
+def _nearby(flights: Flights, targets: Sequence[Target], velocity_256: Ints | None) -> Iterator[tuple[int, _Near]]:
     """Yield the pixels that each flight could touch first, from the box around its path relative to each target.
 
     These are all pixels near its start, and elsewhere those at a rim: a disc that reaches a pixel with eight neighbours
@@ -202,8 +165,9 @@ def _nearby(flights: Flights, targets: Sequence[Target], velocity_256: Ints) -> 
     corners = [[x, y, x + mask.shape[1] - 1, y + mask.shape[0] - 1] for _, mask, (x, y) in targets]
     box, rims = PX * np.array(corners, np.int64).reshape(-1, 4), [_rim(target) for target in targets]
     reach = max(flights.radius_256, HALF)
+    velocity = np.zeros((len(targets), 2), np.int64) if velocity_256 is None else velocity_256
     for number, (start, step) in enumerate(zip(flights.start_256, flights.step_256, strict=True)):
-        relative = step - velocity_256.reshape(-1, 2)
+        relative = step - velocity.reshape(-1, 2)
         low, high = start + np.minimum(relative, 0) - reach, start + np.maximum(relative, 0) + reach
         near = np.flatnonzero((box[:, :2] <= high).all(axis=1) & (box[:, 2:] >= low).all(axis=1))
         pixels = []
