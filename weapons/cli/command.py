@@ -27,6 +27,7 @@ from ..replay.shot_log import REPORTED_MAX, ShotRequest, fire_request, request_f
 from ..replay.stream import Progress, fire_log
 from ..report.cards import place_text
 from ..report.differences import differences
+from ..report.phrases import counted
 from ..report.picture import picture_of_difference, picture_of_report
 from ..report.report import report_of
 from .report_file import read_report
@@ -425,7 +426,7 @@ def fire(arguments: argparse.Namespace) -> None:
     with within(str(scene_folder(arguments.scene) / FILE_NAME)):
         weapons_of(scene)
     done = fire_log(scene, arguments.shots, arguments.output, Progress(sys.stderr))
-    _say(f"{done.shots} shot{'' if done.shots == 1 else 's'}, {done.hit} hit something, in {arguments.output}")
+    _say(f"{counted(done.shots, 'shot')}, {done.hit} hit something, in {arguments.output}")
     if arguments.plan:
         _print_plan(done.plan.timed(), done.plan.calls)
 
