@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -134,8 +135,9 @@ Fired = list[tuple[Hits, Ints]]  # with the ids of the objects that were fired a
 def plane_curves(discs: Discs) -> list[Curve]:
     """Return the curves of all methods that test pixels."""
     scales = tuple(Method(s, partial(_at_scale, discs, s), partial(_decided_by_planes, scale=s)) for s in SCALES)
-    before = tuple(_at_full_scale(discs, word, prefilter=word) for word in PREFILTERS)
-    broad = tuple(_at_full_scale(discs, word, broadphase=word) for word in BROADPHASES)
+    read = partial(_decided_by_planes, scale=1)
+    before = tuple(Method(word, partial(_at_scale, discs, 1, prefilter=word), read) for word in PREFILTERS)
+    broad = tuple(Method(word, partial(_at_scale, discs, 1, broadphase=word), read) for word in BROADPHASES)
     return [
         Curve("pixel planes", "scale", scales),
         Curve("pixels, pre-filter", "pre-filter", before, "at full scale"),
@@ -143,23 +145,18 @@ def plane_curves(discs: Discs) -> list[Curve]:
     ]
 
 
-def _at_full_scale(discs: Discs, word: str, **how: str) -> Method:
-    """Return a method that fires with a pre-filter or a broad phase."""
-    every, weapon = np.arange(len(discs.scene)), Disc(discs.radius, pierce=True)
-    return fired_method(
-        word, discs.scene, weapon, lambda hits: _decided_by_planes([(hits, every)], 1), at=discs.at, **how
-    )
+def _at_scale(discs: Discs, scale: float, **how: Any) -> Callable[[], Fired]:
+    """Return a run with shapes drawn at a scale; above full scale pixels of masks and of the disc become squares.
 
-
-def _at_scale(discs: Discs, scale: float) -> Callable[[], Fired]:
-    """Return a run with shapes drawn at a scale; above full scale pixels of masks and of the disc become squares."""
+    `how` is the pre-filter or the broad phase, at up to full scale.
+    """
     exact = discs.exact | (scale <= 1)
     drawn, squares = np.flatnonzero(exact), np.flatnonzero(~exact)
     runs: list[Callable[[], tuple[Hits, Ints]]] = []
     if len(drawn) or not len(squares):
         alone, disc = copied(discs.scene, drawn, scale), Disc(discs.radius * scale, pierce=True)
         at = scaled(discs.at, scale)
-        runs.append(lambda: (fire(alone, disc, at), drawn))
+        runs.append(lambda: (fire(alone, disc, at, **how), drawn))
     if len(squares):
         k = int(scale)
         pixels = np.array(Disc(discs.radius).spans(1 << TRIG_BITS, 0).to_mask()[0])
