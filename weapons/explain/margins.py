@@ -63,14 +63,9 @@ def _by_length(shifts: Shifts) -> Shifts:
     return np.asarray(shifts[np.lexsort((x, y, x * x + y * y))])
 
 
-def _whole_shifts() -> Shifts:
-    """Shifts of whole pixels, at most MARGIN_PX long."""
-    y, x = np.mgrid[-MARGIN_PX : MARGIN_PX + 1, -MARGIN_PX : MARGIN_PX + 1].reshape(2, -1)
-    return _by_length(np.stack([x, y], axis=1)[x * x + y * y <= MARGIN_PX**2])
-
-
-PATTERN_SHIFTS = _whole_shifts()
-"""Shifts of patterns, px, whole numbers."""
+SIDE = np.arange(-MARGIN_PX, MARGIN_PX + 1)
+PATTERN_SHIFTS = _by_length(np.argwhere(SIDE**2 + SIDE[:, None] ** 2 <= MARGIN_PX**2)[:, ::-1] - MARGIN_PX)
+"""Shifts of patterns: whole pixels, at most MARGIN_PX long."""
 
 RAY_SHIFTS = _by_length(np.concatenate([PATTERN_SHIFTS / part for part in (1, 4, 16, 64, SUB)]))
 """Shifts of rays, px: the shorter they are, the finer, down to 1/256 px."""

@@ -23,13 +23,14 @@ from hitplanes.planes.scene.scene import Scene
 
 from ..explain.samples import detail_of
 from ..fire.call import fired as fire_checked
-from ..fire.hits import BEFORE, HitRow, Hits
+from ..fire.hits import BEFORE, Hits
 from ..fire.spans import context_of
 from ..kinds.areas import is_directed, parts_of, ray_parts_of
 from ..kinds.placements import placements_for, placements_of
 from ..kinds.weapon import Weapon
 from ..rays.contacts import Reason, rays_of
 from ..rays.ray_hits import Passes, RayHits, Stops
+from .differences import BATCH_COLUMNS
 
 CELLS_MAX = 2**18  # most cells of a heat map; in larger views a cell is 2 x 2, 4 x 4, ... pixels
 
@@ -462,7 +463,7 @@ def _batch(scene: Scene, fired: Sequence[Hits], view: Box) -> dict[str, Any]:
         "shots_that_hit": len({row[0] for row in rows}),
         "verdicts": {verdict.name.lower(): int(verdicts[verdict]) for verdict in known},
         "objects": _objects(scene, rows),
-        "columns": [*(name for name in HitRow._fields if name not in ("first_xy", "distance2")), "x", "y", "distance2"],
+        "columns": list(BATCH_COLUMNS),
         "rows": rows,
         "heat": heat_of(fired, view),
         "plan": list({json.dumps(plan): plan for plan in (hits.plan.to_dict() for hits in fired)}.values()),
