@@ -62,11 +62,7 @@ def picture_of_report(report: Mapping[str, Any], scene: Scene, *, text: bool = T
     InputError
         If it is not a report, or the scene is not that of the report.
     """
-    if not isinstance(report, Mapping):
-        raise InputError(f"report: expected one, as report_of makes it, got {shown(report)}")
-    Const(FORMAT).check("report: format", report.get("format"))
-    if not isinstance(scene, Scene):
-        raise InputError(f"scene: expected a Scene, got {kind_of(scene)}")
+    _check(report, scene)
     text = flag("text", text)
     if scene.content_hash() != report["scene"]["hash"]:
         raise InputError(f"scene: expected hash {report['scene']['hash']}, got {scene.content_hash()}: it has changed")
@@ -88,6 +84,15 @@ def picture_of_report(report: Mapping[str, Any], scene: Scene, *, text: bool = T
     if text:
         draw_texts(page, texts)
     return page
+
+
+def _check(report: object, scene: object) -> None:
+    """Refuse what is no report, and what is no scene."""
+    if not isinstance(report, Mapping):
+        raise InputError(f"report: expected one, as report_of makes it, got {shown(report)}")
+    Const(FORMAT).check("report: format", report.get("format"))
+    if not isinstance(scene, Scene):
+        raise InputError(f"scene: expected a Scene, got {kind_of(scene)}")
 
 
 def _names(world: World, report: Mapping[str, Any], scene: Scene) -> list[Text]:

@@ -21,7 +21,7 @@ from hitplanes.planes.scene.history import PastScene
 from hitplanes.planes.scene.objects import Role
 from hitplanes.planes.scene.scene import Scene
 
-from ..explain.samples import detail_of
+from ..explain.samples import Samples, detail_of
 from ..fire.call import fired as fire_checked
 from ..fire.hits import BEFORE, Hits
 from ..fire.spans import context_of
@@ -377,11 +377,7 @@ def _shot(scene: Scene, hits: Hits, weapon: str, row: int) -> dict[str, Any]:
             }
             for entry in hits.blockers(row)
         ],
-        "samples": {  # each pixel once, under its strongest verdict
-            verdict.name.lower(): _runs_of(samples.xy[samples.verdict == verdict])
-            for verdict in Verdict
-            if (samples.verdict == verdict).any()
-        },
+        "samples": _sample_runs(samples),
         **({"sheltered": _runs_of(samples.xy[samples.sheltered])} if sight else {}),
         "plan": hits.plan.to_dict(),
         **(rays_json(scene, hits, row) if isinstance(hits, RayHits) else {}),
@@ -437,6 +433,12 @@ def _rows(scene: Scene, hits: Hits, shot: int, margins: Mapping[int, dict[str, A
         }
         for row, share in zip(rows, shares, strict=True)
     ]
+
+
+def _sample_runs(samples: Samples) -> dict[str, list[list[int]]]:
+    """Runs of the pixels of each verdict that occurs, each pixel once under its strongest verdict."""
+    of = {verdict.name.lower(): samples.xy[samples.verdict == verdict] for verdict in Verdict}
+    return {name: _runs_of(xy) for name, xy in of.items() if len(xy)}
 
 
 def _runs_of(xy: Ints) -> list[list[int]]:
