@@ -55,6 +55,12 @@ class Made(NamedTuple):
     stops: Stops
     numbers: Ints
 
+    @classmethod
+    def of(cls, walk: Walk, rays: Rays) -> Made:
+        """Those of a walk of some of the rays; pixels are numbered if several rays may hit the same."""
+        numbers = walk.pixels(rays.rounds) if rays.pellet.any() else np.zeros(0, np.int64)
+        return cls(walk.passes, walk.stops, numbers)
+
 
 def fired_rays(
     scene: Scene, weapon: Weapon, parts: Parts, shots: Shots, how: tuple[str, str, str], plan: Plan
@@ -265,12 +271,9 @@ def _followed(
             walks.append(walk)
             continue
         room -= len(walk.traced[0].x)
+        walks.append(walk if room >= 0 else Made.of(walk, rays))
         if room < 0:
-            numbers = walk.pixels(rays.rounds) if rays.pellet.any() else np.zeros(0, np.int64)
-            walks.append(Made(walk.passes, walk.stops, numbers))
-            plan.run("passes", "", walk.passes.nbytes + numbers.nbytes)
-        else:
-            walks.append(walk)
+            plan.run("passes", "", walks[-1].passes.nbytes)
     passes = Summed(*map(np.concatenate, zip(*summed, strict=True)))
     ends = np.cumsum([len(part.shot) for part in summed])[:-1]
 

@@ -537,12 +537,8 @@ def rows_of_passes(passes: Summed, rays: Rays, stack: Stack, pixels: Numbered) -
             passes.shot.copy(), passes.round, passes.object, passes.samples, None, passes.weight,
             None, passes.entry_xy, x * x + y * y,
         )  # fmt: skip
-    order = row_order(passes.shot, passes.round, passes.entry_px, passes.pellet, passes.order)
-    group = groups_of(passes, rounds)[order]
-    alike = np.argsort(group, kind="stable")  # passes of each row, that of the nearest pellet first
-    first = np.flatnonzero(begins(group[alike]))
-    row = np.argsort(alike[first])  # of which groups the rows are, in their order
-    order, count = order[alike], np.diff(first, append=len(alike))
+    order, first, row = _grouped(passes, rounds)
+    count = np.diff(first, append=len(order))
     best, pellets = order[first][row], count[row]
     samples, weight = (np.add.reduceat(column[order], first)[row] for column in (passes.samples, passes.weight))
     shot, round_, entry_xy, distinct = passes.shot[best], passes.round[best], passes.entry_xy[best], None
@@ -558,6 +554,18 @@ def rows_of_passes(passes: Summed, rays: Rays, stack: Stack, pixels: Numbered) -
         shot, round_, passes.object[best], samples, None, weight, pellets, entry_xy, (away**2).sum(axis=1),
         distinct=distinct,
     )  # fmt: skip
+
+
+def _grouped(passes: Summed, rounds: int) -> tuple[Ints, Ints, Ints]:
+    """Group the passes of each row, that of the nearest pellet first.
+
+    Returned are the passes in groups, the place there of the first of each group, and the groups in the order of rows.
+    """
+    order = row_order(passes.shot, passes.round, passes.entry_px, passes.pellet, passes.order)
+    group = groups_of(passes, rounds)[order]
+    alike = np.argsort(group, kind="stable")
+    first = np.flatnonzero(begins(group[alike]))
+    return order[alike], first, np.argsort(alike[first])
 
 
 def _distinct(samples: Ints, shared: Ints, turn: Ints, items: Ints, stack: Stack, pixels: Callable[[], Ints]) -> Ints:
