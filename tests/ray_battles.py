@@ -173,8 +173,8 @@ class Battle:
                 for pellet in range(scattered):
                     x = y = 0
                     if gun.spread:
-                        numbers = (np.array([v], np.int64) for v in (shot.number, n, pellet))
-                        x, y = disc_offsets(snapped(radius), self.seed, *numbers)[0].tolist()
+                        numbers = np.array([self.seed], np.uint64), np.array([shot.number]), np.array([n])
+                        x, y = disc_offsets(snapped(radius), *numbers, pellet + 1)[0, pellet].tolist()
                     yield n, k if gun.sweep else pellet, start, (start[0] + dx + 256 * x, start[1] + dy + 256 * y)
 
     def _displacement(self, shot: Shot, turns: Sequence[float]) -> Pixel:

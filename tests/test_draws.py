@@ -20,13 +20,16 @@ PUBLISHED = {
 
 seeds = st.one_of(st.integers(0, 5), st.integers(0, WRAP - 1), st.just(WRAP - 1))
 numbers = st.one_of(st.integers(0, 9), st.integers(0, 2**40))
-counters = st.tuples(numbers, numbers, numbers)  # shot, round, pellet
+counters = st.tuples(numbers, numbers, st.integers(0, 60))  # shot, round, pellet
 
 
 def offsets(radius_256: int, seed, shot, round_, pellet) -> np.ndarray:
-    """Draw with the three counters broadcast to one length."""
-    rows = np.broadcast_arrays(np.asarray(shot, np.int64), np.asarray(round_, np.int64), np.asarray(pellet, np.int64))
-    return draws.disc_offsets(radius_256, seed, *(np.atleast_1d(column).copy() for column in rows))
+    """Draw for rows (n,), each of one pellet; the seed and the three counters are broadcast to one length."""
+    rows = np.broadcast_arrays(*(np.atleast_1d(np.asarray(word, np.uint64)) for word in (seed, shot, round_, pellet)))
+    turns, which = np.unique(np.stack(rows[:3], axis=1), axis=0, return_inverse=True)
+    seed, *numbers = turns.T
+    drawn = draws.disc_offsets(radius_256, seed, *(word.astype(np.int64) for word in numbers), int(rows[3].max()) + 1)
+    return drawn[which.reshape(-1), rows[3].astype(np.int64)]
 
 
 def chi_square(counts: np.ndarray) -> float:
@@ -89,8 +92,8 @@ def test_a_disc_of_one_pixel_has_no_choice(radius_256: int) -> None:
 
 def test_no_rows() -> None:
     none = np.zeros(0, np.int64)
-    drawn = draws.disc_offsets(512, 1, none, none, none)
-    assert drawn.shape == (0, 2)
+    drawn = draws.disc_offsets(512, none.astype(np.uint64), none, none, 3)
+    assert drawn.shape == (0, 3, 2)
     assert drawn.dtype == np.int64
 
 
@@ -139,20 +142,20 @@ def test_a_big_batch_can_be_fired_again_one_by_one() -> None:
 
 @pytest.mark.parametrize("radius_256", [0, 256, 5 * 256, 5 * 256 + 99])
 def test_a_few_draws_are_those_of_many(radius_256: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    turns = np.arange(30)[:, None]
-    rows = np.uint64(WRAP - 3) + np.zeros_like(turns, np.uint64), turns, turns % 3, np.arange(40)
-    many = draws.disc_offsets(radius_256, *rows)
+    turns = np.arange(30)
+    rows = np.full(30, WRAP - 3, np.uint64), turns, turns % 3
+    many = draws.disc_offsets(radius_256, *rows, 40)
     monkeypatch.setattr(draws, "FEW", 30 * 40)
-    assert np.array_equal(draws.disc_offsets(radius_256, *rows), many)
-    assert np.array_equal(draws.disc_offsets(radius_256, WRAP - 3, *(row[7] for row in rows[1:3]), rows[3]), many[7])
+    assert np.array_equal(draws.disc_offsets(radius_256, *rows, 40), many)
+    assert np.array_equal(draws.disc_offsets(radius_256, *(row[7:8] for row in rows), 40), many[7:8])
 
 
-def test_the_counters_are_left_alone() -> None:
-    shot, round_, pellet = np.arange(9), np.arange(9) % 3, np.arange(9) % 2
-    draws.disc_offsets(700, 5, shot, round_, pellet)
-    assert np.array_equal(shot, np.arange(9))
-    assert np.array_equal(round_, np.arange(9) % 3)
-    assert np.array_equal(pellet, np.arange(9) % 2)
+@pytest.mark.parametrize("few", [0, 99])
+def test_the_counters_are_left_alone(few: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(draws, "FEW", few)
+    seed, shot, round_ = np.full(9, 5, np.uint64), np.arange(9), np.arange(9) % 3
+    draws.disc_offsets(700, seed, shot, round_, 2)
+    assert seed.tolist() == [5] * 9 and shot.tolist() == list(range(9)) and round_.tolist() == [0, 1, 2] * 3
 
 
 N = 130_000

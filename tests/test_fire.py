@@ -128,8 +128,8 @@ def rounds_of(
         for pellet in range(spread.count if spread else 1):
             dx, dy = origin
             if spread:
-                numbers = (np.array([v], np.int64) for v in (number, n, pellet))
-                offset = disc_offsets(snapped(spread.radius), seed, *numbers)[0].tolist()
+                numbers = np.array([seed], np.uint64), np.array([number]), np.array([n])
+                offset = disc_offsets(snapped(spread.radius), *numbers, pellet + 1)[0, pellet].tolist()
                 dx, dy = dx + offset[0], dy + offset[1]
             pellets.append(((dx, dy), [((px + dx, py + dy), weight) for (px, py), weight in pattern]))
         yield origin, pellets

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import numpy.typing as npt
 from numba import types
 
+from ..bits.bit_rows import Words
 from ..common.checks import Floats, Ints
 from ..common.limits import GOLDEN, HALF, POSITION_MAX, SUB, TRIG_BITS
 from ..grid.fixed_point import ONE
@@ -492,9 +491,10 @@ def _mixed(z):
     return z ^ (z >> np.uint64(31))
 
 
-@compiled(types.void(types.int64, types.int64, types.uint64, SEEDS, INTS, INTS, PELLETS, types.int64[:, ::1]))
-def _disc_offsets(reach, radius2, bits, seed, shot, round_, pellet, offsets):
-    rows, pellets = pellet.shape
+@compiled(types.void(types.int64, types.int64, types.uint64, SEEDS, INTS, INTS, types.int64[:, :, ::1]))
+def _disc_offsets(reach, radius2, bits, seed, shot, round_, offsets):
+    rows, pellets, _ = offsets.shape
+    found = offsets.reshape(rows * pellets, 2)
     room = max(AT_ONCE, pellets)
     state, drawn, place = np.empty(room, np.uint64), np.empty(room, np.uint64), np.empty(room, np.int64)
     row = 0
@@ -505,7 +505,7 @@ def _disc_offsets(reach, radius2, bits, seed, shot, round_, pellet, offsets):
             turn = _mixed((turn ^ np.uint64(shot[row])) + GOLDEN)
             turn = _mixed((turn ^ np.uint64(round_[row])) + GOLDEN)
             for k in range(pellets):
-                state[count + k] = _mixed((turn ^ np.uint64(pellet[row, k])) + GOLDEN)
+                state[count + k] = _mixed((turn ^ np.uint64(k)) + GOLDEN)
                 place[count + k] = row * pellets + k
             count += pellets
             row += 1
@@ -517,20 +517,15 @@ def _disc_offsets(reach, radius2, bits, seed, shot, round_, pellet, offsets):
             for i in range(count):  # offsets outside the disc are overwritten later
                 x = np.int64(drawn[i] & bits) - reach
                 y = np.int64((drawn[i] >> np.uint64(32)) & bits) - reach
-                offsets[place[i], 0], offsets[place[i], 1] = x, y
+                found[place[i], 0], found[place[i], 1] = x, y
                 state[rest], place[rest] = state[i], place[i]
                 rest += SUB * SUB * (x * x + y * y) > radius2
             count = rest
 
 
-def disc_offsets(radius_256: int, seed: Any, shot: Ints, round_: Ints, pellet: Ints) -> Ints:
+def disc_offsets(radius_256: int, seed: Words, shot: Ints, round_: Ints, pellets: int) -> Ints:
     """See `kinds.draws.disc_offsets`."""
-    *turns, pellets = (np.asarray(seed, np.uint64), shot, round_, pellet)
-    shape, reach = np.broadcast_shapes(*(word.shape for word in (*turns, pellets))), radius_256 // SUB
-    size = shape if len(shape) > 1 else (*shape, 1)  # a row for each turn, or for each pellet alone
-    rows = [word.reshape(-1) if word.size == size[0] else np.broadcast_to(word, size)[:, 0] for word in turns]
-    each = pellets.reshape(size) if pellets.size == size[0] * size[1] else np.broadcast_to(pellets, size)
-    offsets = np.empty((*size, 2), np.int64)
+    reach, offsets = radius_256 // SUB, np.empty((len(shot), pellets, 2), np.int64)
     bits = np.uint64((1 << (2 * reach).bit_length()) - 1)
-    _disc_offsets(reach, radius_256**2, bits, *rows, each, offsets.reshape(-1, 2))
-    return offsets.reshape(*shape, 2)
+    _disc_offsets(reach, radius_256**2, bits, seed, shot, round_, offsets)
+    return offsets

@@ -209,7 +209,6 @@ def placed_pellets(weapon: Weapon, at: Floats) -> Ints | None:
     """Whole pixels (N, pellets, 2) of the pellets of a spread."""
     if not isinstance(weapon, Spread):
         return None
-    n, k = len(at), weapon.count
-    shot, pellet = np.repeat(np.arange(n), k), np.tile(np.arange(k), n)
-    offsets = disc_offsets(int(snap(weapon.radius)), np.full(n * k, SEED, np.uint64), shot, 0 * shot, pellet)
-    return (pixel(snap(at))[shot] + offsets).reshape(n, k, 2)
+    shot = np.arange(len(at))
+    seed = np.full(len(at), SEED, np.uint64)
+    return pixel(snap(at))[:, None] + disc_offsets(int(snap(weapon.radius)), seed, shot, 0 * shot, weapon.count)

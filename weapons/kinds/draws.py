@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from functools import reduce
 
@@ -38,31 +37,28 @@ def _mix(z: Words) -> None:
     z ^= z >> np.uint64(31)
 
 
-def disc_offsets(radius_256: int, seed: int | Words, shot: Ints, round_: Ints, pellet: Ints) -> Ints:
-    """Whole-pixel offsets (n, 2), uniform over the centres of a disc, by rejection on integers.
+def disc_offsets(radius_256: int, seed: Words, shot: Ints, round_: Ints, pellets: int) -> Ints:
+    """Whole-pixel offsets (n, k, 2) of k pellets of rounds, uniform over a disc's centres, by rejection on integers.
 
     Parameters
     ----------
     radius_256 : radius in 1/256 px
-    seed : 0 .. 2**64 - 1; one for all rows, or one for each (n,) uint64
-    shot, round_, pellet : (n,) int64; a row depends only on its seed and its own three numbers. They may broadcast:
-        seeds, shots and rounds (n, 1) and pellets (k,) give offsets (n, k, 2)
+    seed : (n,) seed of each round
+    shot, round_ : (n,) its numbers; the offset of a pellet depends on these three and its own number alone, 0 .. k - 1
     """
-    words = np.asarray(seed, np.uint64), *(np.asarray(word).astype(np.uint64) for word in (shot, round_, pellet))
-    shape = np.broadcast_shapes(*(word.shape for word in words))
-    if math.prod(shape) <= FEW:
-        return np.array(_few(radius_256, words, shape), np.int64).reshape(*shape, 2)
-    offsets = np.empty((*shape, 2), np.int64)
-    at_once = max(ROWS_AT_ONCE // max(shape[-1], 1), 1) if len(shape) > 1 else ROWS_AT_ONCE
-    for first in range(0, shape[0], at_once):
+    words = seed, shot.astype(np.uint64), round_.astype(np.uint64)
+    if len(shot) * pellets <= FEW:
+        return np.array(_few(radius_256, words, pellets), np.int64).reshape(-1, pellets, 2)
+    offsets = np.empty((len(shot), pellets, 2), np.int64)
+    at_once, pellet = max(ROWS_AT_ONCE // pellets, 1), np.arange(pellets).astype(np.uint64)
+    for first in range(0, len(shot), at_once):
         now = slice(first, first + at_once)
-        key, *rest = (word[now] if word.shape[:1] == shape[:1] and word.ndim == len(shape) else word for word in words)
-        key = mix64(key)
-        for word in rest:
-            key = key ^ word  # pellets broadcast to more columns
+        key = mix64(seed[now])
+        for word in (words[1][now], words[2][now], None):
+            key = key[:, None] ^ pellet if word is None else key ^ word
             key += GOLDEN
             _mix(key)
-        offsets[now] = _in_disc(key.reshape(-1), reach=radius_256 // SUB, radius2=radius_256**2).reshape(*key.shape, 2)
+        offsets[now] = _in_disc(key.reshape(-1), radius_256 // SUB, radius_256**2).reshape(-1, pellets, 2)
     return offsets
 
 
@@ -87,21 +83,10 @@ def _in_disc(state: Words, reach: int, radius2: int) -> Ints:
     return offsets
 
 
-def _few(radius_256: int, words: Sequence[Words], shape: tuple[int, ...]) -> list[tuple[int, int]]:
-    """Offsets of rows whose seeds, shots, rounds and pellets broadcast to a shape, one after another."""
-    rows, columns = math.prod(shape), []
-    for word in words:  # to broadcast them all would take as long as the draws
-        every = word if word.size in (1, rows) else np.broadcast_to(word, shape)
-        columns.append(every.reshape(-1).tolist() * (rows if every.size == 1 else 1))
-    turns: dict[tuple[int, ...], int] = {}
-    offsets = []
-    for *turn, pellet in zip(*columns, strict=True):
-        key = tuple(turn)
-        if key not in turns:
-            seed, *rest = turn
-            turns[key] = reduce(_keyed, rest, _mixed(seed))
-        offsets.append(_offset(radius_256, _keyed(turns[key], pellet)))
-    return offsets
+def _few(radius_256: int, words: Sequence[Words], pellets: int) -> list[tuple[int, int]]:
+    """Offsets of pellets of rounds, one after another; `words` are their seeds, shots and numbers."""
+    turns = [reduce(_keyed, rest, _mixed(seed)) for seed, *rest in zip(*(w.tolist() for w in words), strict=True)]
+    return [_offset(radius_256, _keyed(turn, pellet)) for turn in turns for pellet in range(pellets)]
 
 
 def _keyed(state: int, number: int) -> int:

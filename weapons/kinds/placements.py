@@ -410,15 +410,14 @@ def placements_for(weapon: Weapon, shots: Shots) -> Placements:
     turn_xy = pixel(shots.at_256[shot] + round_[:, None] * snap(burst.recoil_xy)) if burst else shots.xy
     if not spread:
         return Placements(table, pattern, turn_xy, turn_xy, rounds)
-    xy = pellets_of(spread, shots.seed[shot, None], shots.number[shot, None], round_[:, None]) + turn_xy[:, None]
+    xy = pellets_of(spread, shots.seed[shot], shots.number[shot], round_) + turn_xy[:, None]
     pattern = None if pattern is None else pattern.repeat(pellets)
     return Placements(table, pattern, xy.reshape(-1, 2), turn_xy, rounds, pellets)
 
 
 def pellets_of(spread: Spread[Any], seed: Words, shot: Ints, round_: Ints) -> Ints:
-    """Offsets (T, K, 2) of the pellets of rounds, from their seeds, shots and rounds (T, 1)."""
-    radius = int(snap(spread.radius))
-    offsets: Ints = kernels_of(late.draws).disc_offsets(radius, seed, shot, round_, np.arange(spread.count))
+    """Offsets (T, K, 2) of the pellets of rounds, from their seeds, shots and rounds (T,)."""
+    offsets: Ints = kernels_of(late.draws).disc_offsets(int(snap(spread.radius)), seed, shot, round_, spread.count)
     return offsets
 
 

@@ -92,7 +92,7 @@ def rounds_of(weapon: Weapon, shot: Shots, offset_256: tuple[int, int] | None) -
     if burst is None:
         pattern, drawn = distinct_patterns(plain, shot.one_direction or STRAIGHT)[0], None
         if spread is not None:
-            drawn = pellets_of(spread, shot.seed[:, None], shot.number[:, None], ORIGIN[:, :1])[0]
+            drawn = pellets_of(spread, shot.seed, shot.number, ORIGIN[:, 0])[0]
         rounds = [Round(0, 0, 0, pattern, drawn)]
     else:
         placements = placements_for(weapon, shot)

@@ -95,8 +95,7 @@ def _steps(parts: Parts, shots: Shots, shot: Ints, round_: Ints) -> Ints:
         ahead = turned_to(several.directions, ahead)
     step = ahead if length is None else scaled(ahead, length)
     if isinstance(several, Spread):
-        offsets = pellets_of(several, shots.seed[shot, None], shots.number[shot, None], round_[:, None])
-        step = step[:, None] + SUB * offsets
+        step = step[:, None] + SUB * pellets_of(several, shots.seed[shot], shots.number[shot], round_)
     return step.reshape(-1, 2)
 
 
