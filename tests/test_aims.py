@@ -240,10 +240,12 @@ def aimed_at(aims: list[float]) -> Any:
 
 @settings(deadline=None)
 @given(AIMS_AT_A_TIME, st.lists(st.tuples(SIZES, SIZES.map(lambda size: -size)), max_size=4))
-def test_points_turn_at_once_as_to_each_direction(aims: list[float], points: list[tuple[int, int]]) -> None:
+def test_compiled_points_turn_as_those_of_numpy(aims: list[float], points: list[tuple[int, int]]) -> None:
+    pytest.importorskip("numba")
     given = np.array(points, np.int64).reshape(-1, 2)
     found = np.array([turned(given, c, s) for c, s in aimed_at(aims).tolist()])
-    assert np.array_equal(fixed_point.turned_to(given, aimed_at(aims)), found)
+    for form in (fixed_point, importlib.import_module(COMPILED[fixed_point.__name__])):
+        assert np.array_equal(form.turned_to(given, aimed_at(aims)), found)
 
 
 @settings(deadline=None)

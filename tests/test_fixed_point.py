@@ -1,9 +1,10 @@
 """The 1/256-px grid: one rounding of positions, directions correct to the last bit, turns and mirrors exact."""
 
+import importlib
 import math
-import re
 from collections.abc import Callable
 from fractions import Fraction
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,8 @@ from hypothesis import strategies as st
 from hitplanes.planes.common.checks import InputError
 from hitplanes.planes.common.limits import POSITION_MAX
 from hitplanes.planes.grid import fixed_point
-from hitplanes.weapons.kinds.placements import places_256
+
+SNAPPING = [fixed_point, *([importlib.import_module("hitplanes.planes.jit.scene")] if find_spec("numba") else [])]
 
 MANY = examples(300, deadline=None)
 FEW = examples(100, deadline=None)
@@ -98,19 +100,20 @@ def test_positions_are_snapped_at_once_as_each_is_alone(
     values: list[float], laid: Callable[[list[float]], np.ndarray[Any, Any]]
 ) -> None:
     at, expected = laid(values), [round(256 * Fraction(value)) for value in values]
-    found, single = places_256("at", at)
-    assert found.dtype == np.int64 and not single
-    assert found.tolist() == np.reshape(expected, (-1, 2)).tolist() and at.tolist() == laid(values).tolist()
+    for kernels in SNAPPING:
+        found = kernels.snapped(at)
+        assert found is not None and found.dtype == np.int64
+        assert found.tolist() == np.reshape(expected, (-1, 2)).tolist() and at.tolist() == laid(values).tolist()
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf, math.nextafter(LIMIT, math.inf), -1.01 * LIMIT])
 def test_positions_out_of_range_are_not_snapped(bad: float) -> None:
-    for place in np.ndindex(9, 2):
-        at = np.ones((9, 2))
-        at[place] = bad
-        with pytest.raises(InputError, match=re.escape(f"at[{place[0]}][{place[1]}]: expected a ")):
-            places_256("at", at)
-    assert places_256("at", np.zeros((0, 2)))[0].shape == (0, 2)
+    for kernels in SNAPPING:
+        for place in np.ndindex(9, 2):
+            at = np.ones((9, 2))
+            at[place] = bad
+            assert kernels.snapped(at) is None
+        assert kernels.snapped(np.zeros((0, 2))).shape == (0, 2)
 
 
 def test_snap_keeps_the_shape_and_the_input() -> None:

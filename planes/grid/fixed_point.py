@@ -7,6 +7,7 @@ same on every machine, and quarter turns and mirrors are exact.
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any, TypeVar
@@ -14,6 +15,7 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from ..common.backend import kernels_of
 from ..common.checks import Bools, Floats, InputError, Ints, all_within, rising
 from ..common.limits import HALF, POSITION_MAX, SUB, TRIG_BITS
 
@@ -21,11 +23,24 @@ ONE = 1 << TRIG_BITS  # 1 as a component of a direction
 DOUBT = 2.0**-12  # a scaled sine nearer to a tie is in doubt; float sines err by a few ulp, 2**-21 after the scaling
 
 
-def _folded(degrees: Floats | float) -> tuple[Floats, Bools, Bools, Bools]:
-    """Angles in [0, 45], and whether cosine and sine are swapped, the cosine is negative, and the sine is.
+def nearest(degrees: Floats) -> tuple[Ints, Ints, Ints]:
+    """Cosines and sines of angles (n,), each times 2**30 and rounded, and the rows whose rounding is in doubt.
 
-    The differences are exact in float64, so a quarter turn exactly swaps the two, and a mirror exactly changes a sign.
+    The angle is folded into [0, 45] by differences that are exact in float64, so a quarter turn exactly swaps the two
+    numbers, and a mirror exactly changes a sign.
     """
+    rest, steep, left, down = _folded(degrees)
+    radians = np.radians(rest)
+    near, far = np.cos(radians) * ONE, np.sin(radians) * ONE
+    whole_near, whole_far = np.rint(near), np.rint(far)
+    doubt = np.maximum(np.abs(near - whole_near), np.abs(far - whole_far)) > 0.5 - DOUBT
+    x, y = whole_near.astype(np.int64), whole_far.astype(np.int64)
+    c, s = np.where(steep, y, x), np.where(steep, x, y)
+    return np.where(left, -c, c), np.where(down, -s, s), np.flatnonzero(doubt)
+
+
+def _folded(degrees: Floats | float) -> tuple[Floats, Bools, Bools, Bools]:
+    """Angles in [0, 45], and whether the two numbers are swapped, the first is negative, and the second is."""
     folded = np.abs(degrees)
     if folded.max(initial=0) >= 360:
         folded = np.fmod(folded, 360.0)
@@ -115,15 +130,8 @@ def unit(degrees: object) -> tuple[Ints, Ints]:
     """
     angle = np.asarray(degrees, np.float64)
     each = angle.ravel()
-    rest, steep, left, down = _folded(each)
-    radians = np.radians(rest)
-    near, far = np.cos(radians) * ONE, np.sin(radians) * ONE
-    whole_near, whole_far = np.rint(near), np.rint(far)
-    doubt = np.maximum(np.abs(near - whole_near), np.abs(far - whole_far)) > 0.5 - DOUBT
-    x, y = whole_near.astype(np.int64), whole_far.astype(np.int64)
-    c, s = np.where(steep, y, x), np.where(steep, x, y)
-    c, s = np.where(left, -c, c), np.where(down, -s, s)
-    for i in np.flatnonzero(doubt).tolist():
+    c, s, doubt = kernels_of(sys.modules[__name__]).nearest(each)
+    for i in doubt.tolist():
         c[i], s[i] = _exactly(float(each[i]))
     return c.reshape(angle.shape), s.reshape(angle.shape)
 
@@ -235,6 +243,11 @@ def _over_length(component: int, squared_length: int) -> int:
     """Round 2**30 component / sqrt(squared_length), by way of the floor of twice the value."""
     twice = math.isqrt((component * component << (2 * TRIG_BITS + 2)) // squared_length)
     return int(math.copysign((twice + 1) // 2, component))
+
+
+def snapped(at: Floats) -> Ints | None:
+    """Positions (N, 2) in px, rounded to 1/256 px as `snap` does; None if any is NaN or out of range."""
+    return snap(at) if all_within(at, -POSITION_MAX, POSITION_MAX) else None
 
 
 def place(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 from numba import types
@@ -9,13 +11,73 @@ from numba import types
 from ..bits.bit_rows import Words
 from ..common.checks import Floats, Ints
 from ..common.limits import GOLDEN, HALF, POSITION_MAX, SUB, TRIG_BITS
-from ..grid.fixed_point import ONE
+from ..grid.fixed_point import DOUBT, ONE
 from ..grid.rasterize import DIAGONAL, ROOM, Edges, sides_of
 from ..grid.spans import WIDEST, RowRuns
 from .bit_rows import BOXES, INTS, OUT
 from .cache import compiled, helper
 
+TERMS = 8  # terms of each series; up to 45 degrees the rest is below 2**-53
+
+SINE = tuple((-1.0) ** k / math.factorial(2 * k + 1) for k in range(TERMS))
+COSINE = tuple((-1.0) ** k / math.factorial(2 * k) for k in range(TERMS + 1))
+
+RADIAN = math.pi / 180
+FLOATS = types.Array(types.float64, 1, "C", readonly=True)
 NO_SIDES = np.zeros(0, np.int64)
+
+
+@compiled(types.boolean(FLOATS, types.int64[::1], types.int64[::1], types.boolean[::1]))
+def _nearest(degrees, cosine, sine, doubt):
+    folded, any_doubt = np.abs(degrees), False
+    for i in range(len(folded)):
+        if folded[i] >= 360:
+            folded[i] = np.fmod(folded[i], 360.0)
+    for i in range(len(folded)):
+        angle = folded[i]
+        down = angle > 180
+        angle = 360 - angle if down else angle
+        left = angle > 90
+        angle = 180 - angle if left else angle
+        steep = angle > 45
+        x = (90 - angle if steep else angle) * RADIAN
+        far, near = SINE[TERMS - 1], COSINE[TERMS]
+        for k in range(TERMS - 2, -1, -1):
+            far = far * (x * x) + SINE[k]
+        for k in range(TERMS - 1, -1, -1):
+            near = near * (x * x) + COSINE[k]
+        far *= x
+        c, s = (far if steep else near) * ONE, (near if steep else far) * ONE
+        c, s = -c if left else c, -s if down ^ (degrees[i] < 0) else s
+        whole_c, whole_s = np.rint(c), np.rint(s)
+        cosine[i], sine[i] = np.int32(whole_c), np.int32(whole_s)
+        doubt[i] = max(abs(c - whole_c), abs(s - whole_s)) > 0.5 - DOUBT
+        any_doubt |= doubt[i]
+    return any_doubt
+
+
+def nearest(degrees: Floats) -> tuple[Ints, Ints, Ints]:
+    """See `grid.fixed_point.nearest`."""
+    count = len(degrees)
+    cosine, sine, doubt = np.empty(count, np.int64), np.empty(count, np.int64), np.empty(count, np.bool_)
+    in_doubt = _nearest(degrees, cosine, sine, doubt)
+    return cosine, sine, np.flatnonzero(doubt) if in_doubt else np.zeros(0, np.int64)
+
+
+@compiled(types.boolean(FLOATS, types.int64[::1]))
+def _snapped(at, whole):
+    good = True
+    for i in range(len(at)):
+        good &= abs(at[i]) <= POSITION_MAX  # false for NaN
+        whole[i] = np.int64(np.rint(at[i] * SUB))
+    return good
+
+
+def snapped(at: Floats) -> Ints | None:
+    """See `grid.fixed_point.snapped`."""
+    whole = np.empty(at.shape, np.int64)
+    return whole if _snapped(at.ravel(), whole.ravel()) else None
+
 
 PELLETS = types.Array(types.int64, 2, "A", readonly=True)
 STEPS = types.Array(types.int64, 3, "A", readonly=True)
@@ -27,6 +89,18 @@ WHOLE = types.int64
 def _over_one(value):
     """See `fixed_point.over_one`."""
     return (value + (ONE // 2 - 1) + ((value >> TRIG_BITS) & 1)) >> TRIG_BITS
+
+
+@compiled(PARTS(PELLETS, PELLETS))
+def turned_to(points_256, direction):
+    """See `grid.fixed_point.turned_to`."""
+    out = np.empty((len(direction), len(points_256), 2), np.int64)
+    for k in range(len(direction)):
+        c, s = direction[k]
+        for i in range(len(points_256)):
+            x, y = points_256[i]
+            out[k, i, 0], out[k, i, 1] = _over_one(x * c - y * s), _over_one(x * s + y * c)
+    return out
 
 
 @helper()

@@ -15,8 +15,8 @@ from hitplanes.planes.common.backend import LruCache, jit_is_on, kernels_of
 from hitplanes.planes.common.checks import InputError, Ints, choice, integer, kind_of, shown, suggestion, within
 from hitplanes.planes.common.limits import HALF, MASK_SIDE_MAX, PATTERN_CACHE_BYTES, PELLETS_MAX, REACH_MAX, SUB
 from hitplanes.planes.common.tables import Flag, Mask, Number, Numbers, Optional, Rows, Value, Whole, Word, typed
-from hitplanes.planes.grid import rasterize
-from hitplanes.planes.grid.fixed_point import ONE, all_quarters, pixel, quarters, snap, turned, turned_to, unit_of
+from hitplanes.planes.grid import fixed_point, rasterize
+from hitplanes.planes.grid.fixed_point import ONE, all_quarters, pixel, quarters, snap, turned, unit_of
 from hitplanes.planes.grid.rasterize import Edges, disc, edges_of, polygon, ring
 from hitplanes.planes.grid.spans import RowRuns, Spans
 from hitplanes.planes.scene.scene import Scene
@@ -271,7 +271,7 @@ class Beam(AreaWeapon):
 
     def runs(self, direction: Ints) -> RowRuns:
         """Segments with round ends, along directions (n, 2)."""
-        end = turned_to(np.array([[_snapped(self.length), 0]]), direction)[:, 0]
+        end = kernels_of(fixed_point).turned_to(np.array([[_snapped(self.length), 0]]), direction)[:, 0]
         runs: RowRuns = kernels_of(rasterize).beams(ORIGIN, end, _snapped(self.width / 2))
         return runs
 
@@ -536,7 +536,8 @@ def weapons_of(scene: Scene) -> dict[str, Weapon]:
 
 def _polygons(points: Ints, starts: Ints, direction: Ints) -> RowRuns:
     """Runs of rings of points (m, 2), which begin at `starts`, turned to directions (n, 2)."""
-    runs: RowRuns = kernels_of(rasterize).polygons(turned_to(points, direction), starts)
+    turned_points = kernels_of(fixed_point).turned_to(points, direction)
+    runs: RowRuns = kernels_of(rasterize).polygons(turned_points, starts)
     return runs
 
 

@@ -16,6 +16,7 @@ from hitplanes.planes.bits.bit_rows import Words, row_order
 from hitplanes.planes.common.backend import cached_attribute, kernels_of
 from hitplanes.planes.common.checks import Floats, InputError, Ints, array_of, each, ids_of, integer, integers, reals
 from hitplanes.planes.common.limits import ALL, CATEGORY_BITS, EVERYTHING, POSITION_MAX, SEED_MAX
+from hitplanes.planes.grid import fixed_point
 from hitplanes.planes.grid.fixed_point import ONE, Whole, pixel, snap, turned, unit, unit_of, unit_toward
 from hitplanes.planes.grid.spans import Columns
 from hitplanes.planes.scene.poses import one_place, points
@@ -328,6 +329,10 @@ def unaimed_shots(field: str, at: object, accept: object, blocked_by: object, ex
 
 def places_256(field: str, at: object) -> tuple[Ints, bool]:
     """Positions (N, 2) in 1/256 px, and whether one position (2,) was given."""
+    if type(at) is np.ndarray and at.shape[1:] == (2,) and at.dtype == np.float64 and at.flags.aligned:
+        many: Ints | None = kernels_of(fixed_point).snapped(at)
+        if many is not None:
+            return many, False
     place = one_place(at)
     if place is not None:
         return np.array((place,), np.int64), True

@@ -22,7 +22,8 @@ from hitplanes.planes.common.backend import LruCache, in_parts, jit_is_on, kerne
 from hitplanes.planes.common.checks import InputError, Ints, kind_of, shown
 from hitplanes.planes.common.limits import MASK_AREA_MAX, REACH_MAX, SUB, WEIGHT_FULL
 from hitplanes.planes.common.tables import Number, Ref, Value
-from hitplanes.planes.grid.fixed_point import ONE, turned_to
+from hitplanes.planes.grid import fixed_point
+from hitplanes.planes.grid.fixed_point import ONE
 from hitplanes.planes.grid.spans import Spans, Strip, ragged, strip_of, strips_of
 
 if TYPE_CHECKING:
@@ -384,7 +385,7 @@ class AimedTable(PatternTable):
             direction, normals = self._direction[begin : min(begin + at_once, last)], NO_NORMALS
             runs = self._weapon.runs(direction)
             if runs is not None and normal:
-                normals = turned_to(np.array([normal]), direction)[:, 0]
+                normals = kernels_of(fixed_point).turned_to(np.array([normal]), direction)[:, 0]
             parts.append(None if runs is None else kernels_of(bit_rows).bits_of_runs(runs, len(direction), normals))
         return parts
 
