@@ -53,7 +53,7 @@ COMPILED = {
     "hitplanes.planes.grid.rasterize": "hitplanes.planes.jit.scene",
     "hitplanes.planes.scene.variants": "hitplanes.planes.jit.planes",
     "hitplanes.planes.bits.label_plane": "hitplanes.planes.jit.areas",
-    "hitplanes.weapons.kinds.draws": "hitplanes.planes.jit.scene",
+    "hitplanes.weapons.kinds.draws": "hitplanes.planes.jit.bit_rows",
     "hitplanes.planes.bits.bit_rows": "hitplanes.planes.jit.bit_rows",
     "hitplanes.planes.bits.shadows": "hitplanes.planes.jit.bit_rows",
     "hitplanes.planes.bits.front_to_back": "hitplanes.planes.jit.areas",

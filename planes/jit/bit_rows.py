@@ -1,4 +1,4 @@
-"""Compiled kernels of bit rows; they work pair by pair and row by row."""
+"""Compiled kernels of bit rows, which work pair by pair and row by row; and of the draws of pellets."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from ..bits import bit_rows, shadows
 from ..bits.bit_rows import NO_STRIPS, NO_SUMS, WORD, PatternBits, Words
 from ..common.backend import in_parts
 from ..common.checks import Ints
+from ..common.limits import GOLDEN, SUB
 from ..grid.spans import WIDEST, RowRuns
 from .cache import compiled, helper
 
@@ -382,3 +383,55 @@ def meets_any(box, at, taken, count):
         if across and box[at, 1] <= box[other, 3] and box[at, 3] >= box[other, 1]:
             return True
     return False
+
+
+SEEDS = types.Array(types.uint64, 1, "A", readonly=True)
+
+AT_ONCE = 256  # least number of pellets that are drawn at a time; those of a round are drawn together
+
+
+@helper(inline="always")
+def _mixed(z):
+    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return z ^ (z >> np.uint64(31))
+
+
+@compiled(types.void(types.int64, types.int64, types.uint64, SEEDS, INTS, INTS, types.int64[:, :, ::1]))
+def _disc_offsets(reach, radius2, bits, seed, shot, round_, offsets):
+    rows, pellets, _ = offsets.shape
+    found = offsets.reshape(rows * pellets, 2)
+    room = max(AT_ONCE, pellets)
+    state, drawn, place = np.empty(room, np.uint64), np.empty(room, np.uint64), np.empty(room, np.int64)
+    row = 0
+    while row < rows:
+        count = 0
+        while row < rows and count + pellets <= room:
+            turn = _mixed(seed[row])
+            turn = _mixed((turn ^ np.uint64(shot[row])) + GOLDEN)
+            turn = _mixed((turn ^ np.uint64(round_[row])) + GOLDEN)
+            for k in range(pellets):
+                state[count + k] = _mixed((turn ^ np.uint64(k)) + GOLDEN)
+                place[count + k] = row * pellets + k
+            count += pellets
+            row += 1
+        while count:
+            for i in range(count):  # without a branch, several at a time
+                state[i] += GOLDEN
+                drawn[i] = _mixed(state[i])
+            rest = 0
+            for i in range(count):  # offsets outside the disc are overwritten later
+                x = np.int64(drawn[i] & bits) - reach
+                y = np.int64((drawn[i] >> np.uint64(32)) & bits) - reach
+                found[place[i], 0], found[place[i], 1] = x, y
+                state[rest], place[rest] = state[i], place[i]
+                rest += SUB * SUB * (x * x + y * y) > radius2
+            count = rest
+
+
+def disc_offsets(radius_256: int, seed: Words, shot: Ints, round_: Ints, pellets: int) -> Ints:
+    """See `kinds.draws.disc_offsets`."""
+    reach, offsets = radius_256 // SUB, np.empty((len(shot), pellets, 2), np.int64)
+    bits = np.uint64((1 << (2 * reach).bit_length()) - 1)
+    _disc_offsets(reach, radius_256**2, bits, seed, shot, round_, offsets)
+    return offsets
