@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from hitplanes.planes.common.backend import cached_attribute
-from hitplanes.planes.common.checks import InputError, Ints
+from hitplanes.planes.common.checks import Floats, InputError, Ints
 from hitplanes.planes.common.limits import PELLETS_MAX, REACH_MAX, STEPS_MAX
 from hitplanes.planes.common.tables import Number, Optional, Value, Whole, Word
 from hitplanes.planes.grid.fixed_point import snap, unit
@@ -206,14 +206,17 @@ class Sweep(Weapon):
         if self.ray.length_256 is None:
             raise InputError("ray: expected a weapon with a range, got one that ends where it is aimed")
 
+    @property
+    def turns(self) -> Floats:
+        """Degrees (count,) from the aim to each ray; those of both sides differ only in their signs."""
+        if self.angle == FULL_CIRCLE:
+            return np.asarray(FULL_CIRCLE * ((np.arange(self.count) - self.count // 2) / self.count))
+        return np.asarray(self.angle * ((2 * np.arange(self.count) - self.count + 1) / (2 * (self.count - 1))))
+
     @cached_attribute
     def directions(self) -> Ints:
-        """Turns (count, 2) from the aim to each ray, as cos and sin times 2**30; both sides are mirror images."""
-        if self.angle == FULL_CIRCLE:
-            turns = FULL_CIRCLE * ((np.arange(self.count) - self.count // 2) / self.count)
-        else:
-            turns = self.angle * ((2 * np.arange(self.count) - self.count + 1) / (2 * (self.count - 1)))
-        return np.stack(unit(turns), axis=1)
+        """Turns (count, 2) from the aim to each ray, as cos and sin times 2**30."""
+        return np.stack(unit(self.turns), axis=1)
 
 
 def ends_at_first(ray: RayWeapon) -> bool:
