@@ -93,8 +93,11 @@ def verdicts_of_rays(walk: Walk, filters: Filters | None, bounds: Box | None) ->
 
 def cells_in(lines: Lines, box_xyxy: Ints, ends: Terminations | None = None) -> Ints:
     """Number of cells (n,) of lines in inclusive boxes (n, 4), each in its own; with ends only those before them."""
-    count = (_wide_cells_in if lines.radius else _thin_cells_in)(lines, box_xyxy, ends)
-    return np.where((box_xyxy[:, :2] <= box_xyxy[:, 2:]).all(axis=1), count, 0)
+    count, kept = np.zeros(len(lines), np.int64), np.flatnonzero((box_xyxy[:, :2] <= box_xyxy[:, 2:]).all(axis=1))
+    if len(kept):  # many lines lie outside the bounds
+        cells = _wide_cells_in if lines.radius else _thin_cells_in
+        count[kept] = cells(lines.take(kept), box_xyxy[kept], None if ends is None else ends.take(kept))
+    return count
 
 
 def _thin_cells_in(lines: Lines, box_xyxy: Ints, ends: Terminations | None) -> Ints:
