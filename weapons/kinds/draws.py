@@ -46,20 +46,24 @@ def disc_offsets(radius_256: int, seed: Words, shot: Ints, round_: Ints, pellets
     seed : (n,) seed of each round
     shot, round_ : (n,) its numbers; the offset of a pellet depends on these three and its own number alone, 0 .. k - 1
     """
-    words = seed, shot.astype(np.uint64), round_.astype(np.uint64)
+    shots, rounds = shot.astype(np.uint64), round_.astype(np.uint64)
     if len(shot) * pellets <= FEW:
-        return np.array(_few(radius_256, words, pellets), np.int64).reshape(-1, pellets, 2)
+        return np.array(_few(radius_256, (seed, shots, rounds), pellets), np.int64).reshape(-1, pellets, 2)
     offsets = np.empty((len(shot), pellets, 2), np.int64)
     at_once, pellet = max(ROWS_AT_ONCE // pellets, 1), np.arange(pellets).astype(np.uint64)
     for first in range(0, len(shot), at_once):
         now = slice(first, first + at_once)
-        key = mix64(seed[now])
-        for word in (words[1][now], words[2][now], None):
-            key = key[:, None] ^ pellet if word is None else key ^ word
-            key += GOLDEN
-            _mix(key)
+        turn = _keyed_words(_keyed_words(mix64(seed[now]), shots[now]), rounds[now])
+        key = _keyed_words(turn[:, None], pellet)
         offsets[now] = _in_disc(key.reshape(-1), radius_256 // SUB, radius_256**2).reshape(-1, pellets, 2)
     return offsets
+
+
+def _keyed_words(states: Words, numbers: Words) -> Words:
+    """States of draws that depend on one more number each; both broadcast. `_keyed` of many."""
+    keyed: Words = (states ^ numbers) + GOLDEN
+    _mix(keyed)
+    return keyed
 
 
 def _in_disc(state: Words, reach: int, radius2: int) -> Ints:
