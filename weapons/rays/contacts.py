@@ -20,9 +20,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from hitplanes.planes.common.backend import kernels_of
 from hitplanes.planes.common.checks import Bools, Floats, Ints
 from hitplanes.planes.common.limits import CHUNK_SAMPLES, SUB
-from hitplanes.planes.grid.fixed_point import muldiv, pixel, scaled, snap, turned_to
+from hitplanes.planes.grid import fixed_point
+from hitplanes.planes.grid.fixed_point import muldiv, pixel, scaled, snap
 from hitplanes.planes.grid.rasterize import COMMON, ROOM, Lines
 from hitplanes.planes.grid.spans import Box, Columns, begins, clipped, merged_runs, pieces, ragged
 from hitplanes.planes.scene.items import Items, Stack
@@ -92,7 +94,7 @@ def _steps(parts: Parts, shots: Shots, shot: Ints, round_: Ints) -> Ints:
     if burst:
         ahead = recoiled(ahead[shot], round_, burst.recoil_deg)
     if isinstance(several, Sweep):
-        ahead = turned_to(several.directions, ahead)
+        ahead = kernels_of(fixed_point).turned_to(several.directions, ahead)
     step = ahead if length is None else scaled(ahead, length)
     if isinstance(several, Spread):
         step = step[:, None] + SUB * pellets_of(several, shots.seed[shot], shots.number[shot], round_)
