@@ -274,10 +274,8 @@ class ShotReader:
         shots = _objects(bodies)
         guns, at = [shot["weapon"] for shot in shots], [shot["at"] for shot in shots]
         aim, toward = [shot.get("aim") for shot in shots], [shot.get("toward") for shot in shots]
-        seed, number = (
-            [shot.get("seed", 0) for shot in shots],
-            [shot.get("shot", n) for n, shot in enumerate(shots, first)],
-        )
+        seed = [shot.get("seed", 0) for shot in shots]
+        number = [shot.get("shot", row) for row, shot in enumerate(shots, first)]
         _usual(all(t is None or a is None for t, a in zip(toward, aim, strict=True)))
         _check_points([*at, *(point for point in toward if point is not None)])
         _check_numbers([angle for angle in aim if angle is not None], AIM_MAX)
