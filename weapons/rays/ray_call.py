@@ -267,18 +267,18 @@ def _followed(
     for walk in _to_ends(rays, ray, shots, through, way, choose):
         summed.append(walk.summed)
         plan.run("rows", "passes, gathered by object")
-        if walk.traced is None:
+        room -= len(walk.traced[0].x) if walk.traced else 0
+        if room >= 0 or not walk.traced:
             walks.append(walk)
             continue
-        room -= len(walk.traced[0].x)
-        walks.append(walk if room >= 0 else Made.of(walk, rays))
-        if room < 0:
-            plan.run("passes", "", walks[-1].passes.nbytes)
+        made = Made.of(walk, rays)
+        walks.append(made)
+        plan.run("passes", "", made.passes.nbytes + made.numbers.nbytes)
     passes = Summed(*map(np.concatenate, zip(*summed, strict=True)))
-    ends = np.cumsum([len(part.shot) for part in summed])[:-1]
 
     def pixels(wanted: Bools) -> Ints:
         """Number the pixels that some of the passes hit."""
+        ends = np.cumsum([len(part.shot) for part in summed])[:-1]
         parts = zip(walks, np.split(wanted, ends), strict=True)
         return np.concatenate(
             [part.numbers if isinstance(part, Made) else part.pixels(rays.rounds, own) for part, own in parts]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -541,19 +541,24 @@ def rows_of_passes(passes: Summed, rays: Rays, stack: Stack, pixels: Numbered) -
     count = np.diff(first, append=len(order))
     best, pellets = order[first][row], count[row]
     samples, weight = (np.add.reduceat(column[order], first)[row] for column in (passes.samples, passes.weight))
-    shot, round_, entry_xy, distinct = passes.shot[best], passes.round[best], passes.entry_xy[best], None
+    shot, round_, item, entry_xy = (c[best] for c in (passes.shot, passes.round, passes.object, passes.entry_xy))
     turn = shot * rounds + round_
-    shared = np.flatnonzero(pellets > 1)
-    if len(shared):
-        wanted = np.zeros(len(order), np.bool_)
-        wanted[order] = np.repeat(count > 1, count)
-        of = turn[shared], passes.object[best[shared]]
-        distinct = partial(_distinct, samples, shared, *of, stack, partial(pixels, wanted))
+
+    def distinct() -> Ints:
+        """Pixels of each row; those that several pellets hit are counted once."""
+        counted, shared = samples.copy(), np.flatnonzero(pellets > 1)
+        if len(shared):
+            wanted = np.zeros(len(order), np.bool_)
+            wanted[order] = np.repeat(count > 1, count)
+            rank = stack.ranks(item[shared])
+            begin = _first_number(turn[shared], rank, stack)
+            ends = begin + stack.numbers[rank + 1] - stack.numbers[rank]
+            counted[shared] = np.diff(np.searchsorted(sorted_once(pixels(wanted)), [begin, ends]), axis=0)[0]
+        return counted
+
     away = entry_xy - rays.origin_xy[turn * pellets_fired + passes.pellet[best]]
-    return Rows(
-        shot, round_, passes.object[best], samples, None, weight, pellets, entry_xy, (away**2).sum(axis=1),
-        distinct=distinct,
-    )  # fmt: skip
+    columns = samples, None, weight, pellets, entry_xy, (away**2).sum(axis=1)
+    return Rows(shot, round_, item, *columns, distinct=distinct)
 
 
 def _grouped(passes: Summed, rounds: int) -> tuple[Ints, Ints, Ints]:
@@ -566,21 +571,3 @@ def _grouped(passes: Summed, rounds: int) -> tuple[Ints, Ints, Ints]:
     alike = np.argsort(group, kind="stable")
     first = np.flatnonzero(begins(group[alike]))
     return order[alike], first, np.argsort(alike[first])
-
-
-def _distinct(samples: Ints, shared: Ints, turn: Ints, items: Ints, stack: Stack, pixels: Callable[[], Ints]) -> Ints:
-    """Pixels of rows, each once.
-
-    Parameters
-    ----------
-    samples : (n,) samples of all rows
-    shared : (k,) rows of several pellets
-    turn, items : (k,) round of each of these, and id of its object
-    pixels : numbers the pixels of these rows, once or more
-    """
-    rank = stack.ranks(items)
-    first = _first_number(turn, rank, stack)
-    ends = first + stack.numbers[rank + 1] - stack.numbers[rank]
-    counted = samples.copy()
-    counted[shared] = np.diff(np.searchsorted(sorted_once(pixels()), [first, ends]), axis=0)[0]
-    return counted
