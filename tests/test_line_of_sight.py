@@ -49,6 +49,7 @@ from hitplanes.planes.bits import shadows
 from hitplanes.planes.common.backend import kernels_of
 from hitplanes.planes.grid.spans import rectangles
 from hitplanes.weapons.cli.command import main
+from hitplanes.weapons.fire import shelter
 from hitplanes.weapons.fire.shelter import ways_box
 from hitplanes.weapons.kinds.placements import placements_for
 
@@ -101,9 +102,12 @@ def test_every_way_agrees_with_one_segment_a_pixel(part: int) -> None:
 @pytest.mark.usefixtures("jit")
 @pytest.mark.parametrize("part", some_of(range(4), 2))
 def test_large_masks_are_covered_near_the_shots(monkeypatch: pytest.MonkeyPatch, part: int) -> None:
-    """Masks of a few pixels are large here: each has many blocks, of which most are far from a shot, in many pieces."""
+    """Masks of a few pixels are large here, and few items a crowd, of which most are far from a shot: many pieces."""
     monkeypatch.setattr(shadows, "BLOCK", 3)
     monkeypatch.setattr(shadows, "CHUNK_SAMPLES", 40)
+    monkeypatch.setattr(shadows, "CHUNK_PAIRS", 40)
+    monkeypatch.setattr(shadows, "FEW_WAYS", 1)
+    monkeypatch.setattr(shelter, "CHUNK_CELLS", 400)
     check(range(400 + 15 * part, 400 + 15 * (part + 1)))
 
 

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.ma  # np.unique loads it, once in a process, which a count of bytes would tell of a stage
 import pytest
 
 from hitplanes import (

@@ -15,7 +15,7 @@ import numpy as np
 from .. import late
 from ..common.backend import kernels_of
 from ..common.checks import Bools, Ints
-from ..grid.spans import Box, begins, ragged
+from ..grid.spans import Box, begins, ragged, sorted_once
 from . import bit_rows
 from .bit_rows import PatternBits, Placed, Words, nearest, row_order, rows_of, weights_of
 from .cells import Cells, listed_at, met_boxes
@@ -250,12 +250,12 @@ def _shelter(
     asked, boxes = bit_rows.placed_boxes(placed, windows)[:, placement].T, tiles.box_xyxy[near.tile]
     boxes = np.concatenate([np.maximum(boxes[:, :2], asked[:, :2]), np.minimum(boxes[:, 2:], asked[:, 2:])], axis=1)
     origin_xy = np.stack([placed.x.take(placement), placed.y.take(placement)], axis=1)
-    pair, blocker = shadows.ways_met(boxes, origin_xy, blockers)
-    other = blockers.rank[blocker] != tiles.rank[near.tile[pair]]
-    if rule.meets is not None and len(blockers.categories):
-        other &= _accepted(blockers, rule.meets, rule.exclude, placement[pair], blocker)
     corner_xy = np.stack([near.left, near.top], axis=1)
-    kernels_of(shadows).hide_behind(rows, corner_xy, origin_xy, blockers, pair[other], blocker[other])
+    for pair, blocker in shadows.ways_met(boxes, origin_xy, blockers):
+        other = blockers.rank[blocker] != tiles.rank[near.tile[pair]]
+        if rule.meets is not None and len(blockers.categories):
+            other &= _accepted(blockers, rule.meets, rule.exclude, placement[pair], blocker)
+        kernels_of(shadows).hide_behind(rows, corner_xy, origin_xy, blockers, pair[other], blocker[other])
 
 
 def _fronts(tiles: OrderedTiles, near: Near, height: int) -> tuple[Ints, Ints, Ints]:
@@ -279,7 +279,8 @@ def _fronts(tiles: OrderedTiles, near: Near, height: int) -> tuple[Ints, Ints, I
 
 def _fronts_of_many(tiles: OrderedTiles, near: Near) -> tuple[Ints, Ints, Ints]:
     """Like `_fronts`, for crowds, in which most tiles near a placement do not meet: those that meet are found first."""
-    distinct, which = np.unique(near.tile, return_inverse=True)
+    distinct = sorted_once(near.tile)
+    which = distinct.searchsorted(near.tile)
     boxes = tiles.box_xyxy[distinct]
     own, other = met_boxes(boxes, boxes)
     before = (other < own).nonzero()[0]

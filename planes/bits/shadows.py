@@ -19,7 +19,7 @@ Ericson, *Real-Time Collision Detection* (2005), 5.3.3 (segment against box).
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import product
 from typing import NamedTuple
@@ -28,7 +28,7 @@ import numpy as np
 
 from ..common.backend import LruCache, kernels_of
 from ..common.checks import Bools, Floats, Ints
-from ..common.limits import CHUNK_SAMPLES
+from ..common.limits import CHUNK_PAIRS, CHUNK_SAMPLES
 from ..grid.spans import Box, begins, clipped, each_pixel, merged_runs, pieces, ragged, rectangles, sorted_once
 from .bit_rows import WORD, Words
 from .cells import met_boxes
@@ -45,6 +45,9 @@ ROWS_AT_ONCE = 2**15
 
 BLOCK = 128
 """Side of the blocks in which a larger mask is covered, px; only those near the shots are."""
+
+FEW_WAYS = 2**8
+"""Most pairs of a way and a blocker that are not looked at closer before their rectangles are."""
 
 ONE_BLOCK = 0, 0, 1, 1
 
@@ -153,15 +156,32 @@ def _rectangles_of(mask_of: Callable[[int], Bools], row: int, block: tuple[int, 
     return rects
 
 
-def ways_met(boxes_xyxy: Ints, origin_xy: Ints, blockers: Blockers) -> tuple[Ints, Ints]:
-    """Sorted pairs (row, blocker) of which the box may meet the way from an origin (n, 2) to pixels of a box (n, 4)."""
-    low, high = np.minimum(boxes_xyxy[:, :2], origin_xy), np.maximum(boxes_xyxy[:, 2:], origin_xy)
-    return met_boxes(np.concatenate([low, high], axis=1), blockers.box_xyxy)
+def ways_met(boxes_xyxy: Ints, origin_xy: Ints, blockers: Blockers) -> Iterator[tuple[Ints, Ints]]:
+    """Sorted pairs (row, blocker) of which the box may meet the way from an origin (n, 2) to pixels of a box (n, 4).
+
+    They come in parts, as a large blast in a crowd has millions of them.
+    """
+    step = max(CHUNK_PAIRS // max(len(blockers.rank), 1), 1)
+    for begin in range(0, max(len(boxes_xyxy), 1), step):
+        box, origin = boxes_xyxy[begin : begin + step], origin_xy[begin : begin + step]
+        low, high = np.minimum(box[:, :2], origin), np.maximum(box[:, 2:], origin)
+        row, blocker = met_boxes(np.concatenate([low, high], axis=1), blockers.box_xyxy)
+        if len(row) > FEW_WAYS:
+            seen, far = (side - np.tile(origin[row], 2) for side in (blockers.box_xyxy[blocker], box[row]))
+            kept = _between(seen, far).nonzero()[0]
+            row, blocker = row[kept], blocker[kept]
+        yield row + begin, blocker
+
+
+def all_ways_met(boxes_xyxy: Ints, origin_xy: Ints, blockers: Blockers) -> tuple[Ints, Ints]:
+    """All pairs of `ways_met`."""
+    row, blocker = zip(*ways_met(boxes_xyxy, origin_xy, blockers), strict=True)
+    return np.concatenate(row), np.concatenate(blocker)
 
 
 def begun_in(origin_xy: Ints, blockers: Blockers) -> tuple[Ints, Ints]:
     """Sorted pairs (row, blocker) of origins (n, 2) that lie on a blocker."""
-    row, blocker = ways_met(np.tile(origin_xy, 2), origin_xy, blockers)
+    row, blocker = all_ways_met(np.tile(origin_xy, 2), origin_xy, blockers)
     place, rects = blockers.rects_of(blocker, origin_xy[row])
     begun = sorted_once(place[_holds_origin(rects)])
     return row[begun], blocker[begun]
@@ -400,6 +420,13 @@ def shelter_of(runs: Runs, origin_xy: Ints, blockers: Blockers, placement: Ints,
     return Shelter(items, ranks)
 
 
+def sheltered_pixels(runs: Runs, origin_xy: Ints, blockers: Blockers, placement: Ints, blocker: Ints) -> Ints:
+    """Number of pixels (n,) of each run that any blocker shelters; parameters are those of `shelter_of`."""
+    run, first, last = _hidden(runs, origin_xy, blockers, placement, blocker)[1:]
+    which, first, last = merged_runs(run, first, last)
+    return np.bincount(run[which], last - first + 1, len(runs)).astype(np.int64)
+
+
 def _hidden(
     runs: Runs, origin_xy: Ints, blockers: Blockers, placement: Ints, blocker: Ints
 ) -> tuple[Ints, Ints, Ints, Ints]:
@@ -417,15 +444,15 @@ def _hidden(
         own = pair[piece][rect]
         run = begin[own] + place
         first, last, bare_first, bare_last = shadow(rects[piece][rect], runs.y[run] - y[own])
-        bare = bare_first <= bare_last
-        before = first, np.where(bare, bare_first - 1, last)
-        for part in (before, (np.where(bare, bare_last + 1, np.inf), last)):
-            low = np.maximum(part[0], runs.x_first[run] - x[own])
-            high = np.minimum(part[1], runs.x_last[run] - x[own])
+        first, last = np.maximum(first, runs.x_first[run] - x[own]), np.minimum(last, runs.x_last[run] - x[own])
+        bare = (bare_first <= bare_last).nonzero()[0]
+        after = np.maximum(bare_last[bare] + 1, first[bare]), last[bare]
+        last[bare] = np.minimum(bare_first[bare] - 1, last[bare])
+        for own_part, run_part, low, high in ((own, run, first, last), (own[bare], run[bare], *after)):
             kept = (low <= high).nonzero()[0]
-            shift = x[own[kept]]
+            shift = x[own_part[kept]]
             left, right = (side[kept].astype(np.int64) + shift for side in (low, high))
-            found.append((own[kept], run[kept], left, right))
+            found.append((own_part[kept], run_part[kept], left, right))
     columns = [np.concatenate(column) for column in zip(*found, strict=True)]
     return columns[0], columns[1], columns[2], columns[3]
 

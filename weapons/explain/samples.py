@@ -238,7 +238,7 @@ def _exposed(visible: Bools, rank: int, origin_xy: Ints, shot: Shots, context: Q
     spans = Spans.from_mask(visible, (int(box[0]), int(box[1])))
     y, x_first, x_last = (np.tile(side, pellets) for side in (spans.y, spans.x_first, spans.x_last))
     runs = Runs(np.arange(pellets).repeat(len(spans)), y, x_first, x_last, np.zeros_like(y))
-    pellet, blocker = late.shadows.ways_met(np.tile(box, (pellets, 1)), origin_xy, blockers)
+    pellet, blocker = late.shadows.all_ways_met(np.tile(box, (pellets, 1)), origin_xy, blockers)
     met = ~refused(context.stack, blockers.rank[blocker], shot, np.zeros(len(blocker), np.int64))
     shelter = late.shadows.shelter_of(runs, origin_xy, blockers, pellet[met], blocker[met])
     hidden = shelter.hides(np.arange(len(shelter.items)), np.array(rank)).reshape(pellets, -1)
@@ -290,7 +290,7 @@ def detail_of(context: QueryContext, weapon: Weapon, shots: Shots) -> Detail:
         own = _refused_first(events, start, len(x))
         which = np.flatnonzero(hidden)
         rank[which] = ended[which] = shelter_ranks(
-            placements, shots, stack, blockers, runs.placement[run[which]],
+            runs, placements, shots, stack, blockers, runs.placement[run[which]],
             np.stack([x, y], axis=1)[which], own[which],
         )  # fmt: skip
     if bounds is not None:

@@ -24,7 +24,7 @@ from hitplanes.planes.common.backend import LruCache
 from hitplanes.planes.common.checks import Bools, Ints, boxes_in, choice
 from hitplanes.planes.common.limits import BOUNDING_BYTES, BOUNDING_CACHE_BYTES, CORNERS, GROWN_PX, PAIRS_AT_ONCE, SUB
 from hitplanes.planes.grid.rasterize import Lines
-from hitplanes.planes.grid.spans import Box, meets
+from hitplanes.planes.grid.spans import Box, meets, sorted_once
 from hitplanes.planes.scene.derived import OF_ALL, View
 from hitplanes.planes.scene.items import Items, Stack
 
@@ -174,7 +174,8 @@ class Candidates:
         found = placements.count[placement] > 0  # the box of an empty pattern lies within others
         placement, rank, prefilter = placement[found], rank[found], self.prefilter
         if len(rank):
-            fired, of_pattern = np.unique(placements.pattern[placement], return_inverse=True)
+            fired = sorted_once(placements.pattern[placement])
+            of_pattern = fired.searchsorted(placements.pattern[placement])
             patterns = pattern_volumes(prefilter.name, [placements.table.patterns[i] for i in fired.tolist()])
             corner_xy = self.stack.box_xyxy[rank, :2] - placements.xy[placement]
             found[found] = _meet(prefilter.volume, self.items, self.stack.rows[rank], corner_xy, patterns, of_pattern)

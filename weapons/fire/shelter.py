@@ -8,9 +8,9 @@ import numpy as np
 
 from hitplanes.planes import late
 from hitplanes.planes.common.checks import InputError, Ints
-from hitplanes.planes.common.limits import SUB
+from hitplanes.planes.common.limits import CHUNK_CELLS, SUB
 from hitplanes.planes.grid.fixed_point import snap
-from hitplanes.planes.grid.spans import Box, meets
+from hitplanes.planes.grid.spans import Box, begins, meets, pieces
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
@@ -76,9 +76,14 @@ def blockers_of(
     return late.shadows.Blockers(rank, boxes_xyxy, *rects, *whose, scene.bounds, leaves)
 
 
-def near_blockers(placements: Placements, shots: Shots, stack: Stack, blockers: Blockers) -> tuple[Ints, Ints]:
-    """Sorted pairs of a placement and a blocker that its shot accepts, which may shelter pixels of its pattern."""
-    placement, blocker = late.shadows.ways_met(placements.boxes, placements.xy, blockers)
+def _near(runs: Runs, placements: Placements, shots: Shots, stack: Stack, blockers: Blockers) -> tuple[Ints, Ints]:
+    """Sorted pairs of a placement and a blocker that its shot accepts, which may shelter pixels of runs."""
+    begin = begins(runs.placement).nonzero()[0]
+    placement, end = runs.placement[begin], np.append(begin[1:], len(runs))[: len(begin)]
+    left, right = np.minimum.reduceat(runs.x_first, begin), np.maximum.reduceat(runs.x_last, begin)
+    boxes = np.stack([left, runs.y[begin], right, runs.y[end - 1]], axis=1)
+    row, blocker = late.shadows.all_ways_met(boxes, placements.xy[placement], blockers)
+    placement = placement[row]
     if len(blockers.categories):
         kept = ~refused(stack, blockers.rank[blocker], shots, placements.shot[placement])
         placement, blocker = placement[kept], blocker[kept]
@@ -87,22 +92,31 @@ def near_blockers(placements: Placements, shots: Shots, stack: Stack, blockers: 
 
 def sheltered(runs: Runs, placements: Placements, shots: Shots, stack: Stack, blockers: Blockers) -> Shelter:
     """What shelters the samples of runs of placed patterns."""
-    placement, blocker = near_blockers(placements, shots, stack, blockers)
-    first, last = runs.placement[[0, -1]].tolist() if len(runs) else (0, -1)
-    kept = (placement >= first) & (placement <= last)
-    return late.shadows.shelter_of(runs, placements.xy, blockers, placement[kept], blocker[kept])
+    near = _near(runs, placements, shots, stack, blockers)
+    return late.shadows.shelter_of(runs, placements.xy, blockers, *near)
+
+
+def sheltered_pixels(runs: Runs, placements: Placements, shots: Shots, stack: Stack, blockers: Blockers) -> Ints:
+    """Number of sheltered pixels (P,) of each placement in runs."""
+    counts = np.zeros(len(placements.xy), np.int64)
+    for part in pieces(np.full(len(runs), max(len(blockers.rects), 1)), CHUNK_CELLS):
+        strip = runs.take(part)
+        near = _near(strip, placements, shots, stack, blockers)
+        np.add.at(counts, strip.placement, late.shadows.sheltered_pixels(strip, placements.xy, blockers, *near))
+    return counts
 
 
 def shelter_ranks(
-    placements: Placements, shots: Shots, stack: Stack, blockers: Blockers, of: Ints, xy: Ints, own: Ints
+    runs: Runs, placements: Placements, shots: Shots, stack: Stack, blockers: Blockers, of: Ints, xy: Ints, own: Ints
 ) -> Ints:
     """Rank of the item that shelters each sample (s,): the first on the way, and in front of others there.
 
     Parameters
     ----------
+    runs : those of the samples
     of, xy, own : (s,) placement, rising, (s, 2) pixel, and (s,) rank of an item that does not count, or -1
     """
-    placement, blocker = near_blockers(placements, shots, stack, blockers)
+    placement, blocker = _near(runs, placements, shots, stack, blockers)
     return late.shadows.sheltered_by(blockers, placement, blocker, of, xy, placements.xy, own)
 
 

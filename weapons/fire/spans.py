@@ -12,6 +12,7 @@ from hitplanes.planes.bits.span_walk import (
     HIT,
     LIVE,
     OF_PATTERNS,
+    SHELTERED,
     VERDICT_OF,
     Events,
     Kinds,
@@ -114,13 +115,18 @@ def direct(placements: Placements, shots: Shots, context: QueryContext, counted:
         return _met(placements, Runs.joined([]), [], counts, context.plan)
     placement, rank = near_pairs(placements, np.arange(len(boxes)), boxes, context)
     pairs = Pairs(placement, rank, _kinds(rank, placements.shot[placement], shots, context))
-    if counted and context.blockers is not None and len(boxes):
-        every = np.arange(len(boxes))
-        runs = _laid(placements, every, boxes if context.bounds is None else clipped(boxes, context.bounds))
-    else:
-        runs = _under_items(placements, pairs, context)
+    runs = _under_items(placements, pairs, context)
     context.plan.run("samples", "runs where items may be", runs.nbytes)
-    return _met(placements, runs, _walked(placements, shots, runs, pairs, context, counts), counts, context.plan)
+    besides = None
+    if counted and context.blockers is not None:
+        every = boxes if context.bounds is None else clipped(boxes, context.bounds)
+        laid = _laid(placements, np.arange(len(boxes)), every)
+        besides = late.shelter.sheltered_pixels(laid, placements, shots, context.stack, context.blockers)
+    walked = _walked(placements, shots, runs, pairs, context, counts, besides)
+    if besides is not None:
+        counts[:, Verdict.OCCLUDED] += besides
+        counts[:, Verdict.EMPTY] -= besides
+    return _met(placements, runs, walked, counts, context.plan)
 
 
 def _under_items(placements: Placements, pairs: Pairs, context: QueryContext) -> Runs:
@@ -154,9 +160,15 @@ def _kinds(rank: Ints, shot: Ints, shots: Shots, context: QueryContext) -> Kinds
 
 
 def _walked(
-    placements: Placements, shots: Shots, runs: Runs, pairs: Pairs, context: QueryContext, counts: Ints
+    placements: Placements,
+    shots: Shots,
+    runs: Runs,
+    pairs: Pairs,
+    context: QueryContext,
+    counts: Ints,
+    sheltered: Ints | None,
 ) -> list[Events]:
-    """Walk runs strip by strip, and add to the counts."""
+    """Walk runs strip by strip, add to the counts, and take their pixels off the sheltered ones (P,)."""
     found, plan = [], context.plan
     for strip in pieces(runs.lengths, CHUNK_SAMPLES) if len(runs) else ():
         part = runs.take(strip)
@@ -171,6 +183,9 @@ def _walked(
         plan.run("walk", "samples through the stack, front to back", state.nbytes + events.nbytes)
         met = state != LIVE
         _count(counts, np.repeat(part.placement, part.lengths)[met], state[met], None)
+        if sheltered is not None:
+            hidden = np.repeat(part.placement, part.lengths)[(state & SHELTERED) != 0]
+            sheltered -= np.bincount(hidden, minlength=len(sheltered))
         plan.run("verdicts", "")
     return found
 
