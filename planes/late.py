@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from types import ModuleType
 
+    from .bits import blockers as blockers
     from .bits import distance_field as distance_field
     from .bits import label_plane as label_plane
     from .bits import shadows as shadows
@@ -22,8 +23,9 @@ if TYPE_CHECKING:
     from .volumes import volumes as volumes
 
 _PLACES = (
-    "bits.distance_field", "bits.label_plane", "bits.shadows", "bits.tiles", "bits.visible", "broadphase.boxes",
-    "files.scene_folder", "scene.carving", "scene.render", "volumes.fit", "volumes.overlap", "volumes.volumes",
+    "bits.blockers", "bits.distance_field", "bits.label_plane", "bits.shadows", "bits.tiles", "bits.visible",
+    "broadphase.boxes", "files.scene_folder", "scene.carving", "scene.render", "volumes.fit", "volumes.overlap",
+    "volumes.volumes",
 )  # fmt: skip
 
 

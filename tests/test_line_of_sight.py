@@ -45,6 +45,7 @@ from hitplanes import (
     report_of,
     weapons_of,
 )
+from hitplanes.planes.bits import blockers as blockers_module
 from hitplanes.planes.bits import shadows
 from hitplanes.planes.common.backend import kernels_of
 from hitplanes.planes.grid.spans import rectangles
@@ -103,7 +104,7 @@ def test_every_way_agrees_with_one_segment_a_pixel(part: int) -> None:
 @pytest.mark.parametrize("part", some_of(range(4), 2))
 def test_large_masks_are_covered_near_the_shots(monkeypatch: pytest.MonkeyPatch, part: int) -> None:
     """Masks of a few pixels are large here, and few items a crowd, of which most are far from a shot: many pieces."""
-    monkeypatch.setattr(shadows, "BLOCK", 3)
+    monkeypatch.setattr(blockers_module, "BLOCK", 3)
     monkeypatch.setattr(shadows, "CHUNK_SAMPLES", 40)
     monkeypatch.setattr(shadows, "CHUNK_PAIRS", 40)
     monkeypatch.setattr(shadows, "FEW_WAYS", 1)
@@ -132,7 +133,7 @@ def test_all_ways_lie_in_their_box() -> None:
 def test_a_shot_covers_the_blocks_that_it_may_reach(monkeypatch: pytest.MonkeyPatch) -> None:
     """Terrain is a new mask after each hole, so only what is near an explosion is covered anew."""
     made: list[tuple[int, ...]] = []
-    monkeypatch.setattr(shadows, "rectangles", lambda mask: made.append(mask.shape) or rectangles(mask))
+    monkeypatch.setattr(blockers_module, "rectangles", lambda mask: made.append(mask.shape) or rectangles(mask))
     scene = Scene((1300, 700))
     ground = scene.add(np.arange(400)[:, None] + np.zeros(1300) > 99, (649.5, 499.5))
     scene.add(np.ones((9, 9), np.bool_), (320, 395))
@@ -142,7 +143,7 @@ def test_a_shot_covers_the_blocks_that_it_may_reach(monkeypatch: pytest.MonkeyPa
         assert hits == fire(scene, bomb, at, strategy="spans") and ground in hits.object
         counts.append(len(made))
         scene.carve(hits)
-    assert max(counts) < 20 and all(max(size) <= shadows.BLOCK for size in made)
+    assert max(counts) < 20 and all(max(size) <= blockers_module.BLOCK for size in made)
     made.clear()
     fire(scene, bomb, (300, 390))
     fire(scene, bomb, (301, 391))
@@ -433,6 +434,65 @@ def test_rectangles_cover_a_mask_and_nothing_else(height: int, width: int, data:
         assert mask[y : y_max + 1, x : x_max + 1].all()
         covered[y : y_max + 1, x : x_max + 1] = True
     assert (covered == mask).all()
+
+
+@pytest.mark.usefixtures("jit")
+@pytest.mark.parametrize("few", [2**8, 0])
+@pytest.mark.parametrize("bounds", [None, (-9, -7, 12, 9)])
+def test_shadows_of_masks_of_any_shape(
+    monkeypatch: pytest.MonkeyPatch, few: int, bounds: tuple[int, int, int, int] | None
+) -> None:
+    """Rectangles one by one, and connected parts beyond their rows, against the way to each pixel."""
+    monkeypatch.setattr(shadows, "FEW_WAYS", few)
+    rng, parts, hidden = np.random.default_rng(8), [], 0
+    for _ in range(60):
+        mask = rng.random(rng.integers(1, 10, 2)) < rng.uniform(0.2, 1)
+        corner = rng.integers(-12, 13, 2)
+        rects, first = blockers_module.in_parts(rectangles(mask))
+        parts.append(first.sum() - len(first))
+        box = np.concatenate([corner, corner + np.array(mask.shape[::-1]) - 1])[None]
+        none, begin = np.zeros(1, np.int64), np.array([0, len(rects)])
+        blockers = blockers_module.Blockers(none, box, begin, rects, first, none[:0], none[:0], bounds, False)
+        set_xy = np.argwhere(mask)[:, ::-1] + corner
+        held = {(x, y) for x, y in set_xy.tolist() if not bounds or not oracle_shelter.outside((x, y), bounds)}
+        rows = np.full((1, 45), 2**64 - 1, np.uint64)
+        kernels_of(shadows).hide_behind(rows, np.array([[-32, -22]]), none.repeat(2)[None], blockers, none, none)
+        for row, word in enumerate(rows[0].tolist()):
+            for x in range(-32, 32):
+                way = oracle_shelter.supercover(x, row - 22).keys() - {(x, row - 22)}
+                assert (word >> (x + 32) & 1) == (not held & way), (mask, corner, x, row - 22)
+                hidden += bool(held & way)
+    assert min(parts) < -4 and max(parts) == 0 and hidden > 10_000
+
+
+@pytest.mark.usefixtures("jit")
+@pytest.mark.parametrize("part", some_of(range(4), 2))
+def test_parts_in_worlds(monkeypatch: pytest.MonkeyPatch, part: int) -> None:
+    monkeypatch.setattr(shadows, "FEW_WAYS", 0)
+    check(range(600 + 15 * part, 600 + 15 * (part + 1)))
+
+
+@examples(200, deadline=None)
+@given(st.integers(1, 9), st.integers(1, 9), st.data())
+def test_parts_are_connected_and_do_not_touch(height: int, width: int, data: st.DataObject) -> None:
+    mask = np.array(data.draw(st.lists(st.lists(st.booleans(), min_size=width, max_size=width),
+                                       min_size=height, max_size=height)))  # fmt: skip
+    rects, first = blockers_module.in_parts(rectangles(mask))
+    number = np.full((height, width), -1)
+    for (x, y, x_max, y_max), part in zip(rects.tolist(), np.cumsum(first).tolist(), strict=True):
+        number[y : y_max + 1, x : x_max + 1] = part
+    assert ((number >= 0) == mask).all()
+    left = {(x, y) for y, x in np.argwhere(mask).tolist()}
+    while left:
+        part, edge = set(), [left.pop()]
+        while edge:
+            x, y = edge.pop()
+            part.add((x, y))
+            near = {(x + dx, y + dy) for dx in (-1, 0, 1) for dy in (-1, 0, 1)} & left
+            left -= near
+            edge += near
+        numbers = {int(number[y, x]) for x, y in part}
+        assert len(numbers) == 1 and int((number == numbers.pop()).sum()) == len(part)
 
 
 def has_a_gap(squares: list[tuple[int, int]], x: int, y: int) -> bool:

@@ -21,7 +21,7 @@ from .bit_rows import PatternBits, Placed, Words, nearest, row_order, rows_of, w
 from .cells import Cells, listed_at, met_boxes
 
 if TYPE_CHECKING:
-    from .shadows import Blockers
+    from .blockers import Blockers
 
 FRONTS_AT_ONCE = 2**14
 """Most pairs of tiles near the same placement that are all listed; of more, only those that meet are listed."""
@@ -255,7 +255,9 @@ def _shelter(
         other = blockers.rank[blocker] != tiles.rank[near.tile[pair]]
         if rule.meets is not None and len(blockers.categories):
             other &= _accepted(blockers, rule.meets, rule.exclude, placement[pair], blocker)
-        kernels_of(shadows).hide_behind(rows, corner_xy, origin_xy, blockers, pair[other], blocker[other])
+        for own, blocker_now in shadows.nearest_first(pair[other], blocker[other], origin_xy, blockers):
+            lit = np.bitwise_or.reduce(rows, axis=1)[own] != 0
+            kernels_of(shadows).hide_behind(rows, corner_xy, origin_xy, blockers, own[lit], blocker_now[lit])
 
 
 def _fronts(tiles: OrderedTiles, near: Near, height: int) -> tuple[Ints, Ints, Ints]:

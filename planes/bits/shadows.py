@@ -9,7 +9,8 @@ item shelters p if one of its pixels lies on the way:
 A mask is covered by rectangles. The pixels of a row behind a rectangle form one interval, whose ends are quotients of
 whole numbers: the segment from (0, 0) to (x, y) meets a box if it is not separated from it by a side of the box or by
 its own line. The item's own pixels hide those behind them; the bare ones, which nothing of the rectangle lies before,
-are told apart. `jit.bit_rows` has the compiled forms of `hide_behind` and `left_and_met`.
+are told apart. In the rows beyond a connected part of a mask one interval is left, between its outermost corners.
+`jit.bit_rows` has the compiled forms of `hide_behind` and `left_and_met`.
 
 References
 ----------
@@ -19,141 +20,38 @@ Ericson, *Real-Time Collision Detection* (2005), 5.3.3 (segment against box).
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
-from functools import partial
-from itertools import product
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from ..common.backend import LruCache, kernels_of
+from ..common.backend import kernels_of
 from ..common.checks import Bools, Floats, Ints
 from ..common.limits import CHUNK_PAIRS, CHUNK_SAMPLES
-from ..grid.spans import Box, begins, clipped, each_pixel, merged_runs, pieces, ragged, rectangles, sorted_once
+from ..grid.spans import begins, each_pixel, merged_runs, pieces, ragged, sorted_once
 from .bit_rows import WORD, Words
+from .blockers import Blockers
 from .cells import met_boxes
 from .span_walk import Runs
 from .visible import sides_of
 
 NEVER = np.iinfo(np.int64).max
 
-COVERS_BYTES, MASK_BYTES = 2**25, 200
-"""Size of the caches of rectangles, and memory of a mask's beside its numbers, bytes."""
-
 ROWS_AT_ONCE = 2**15
 """Rows of rectangles worked on at a time: 256 KB for each of their columns."""
 
-BLOCK = 128
-"""Side of the blocks in which a larger mask is covered, px; only those near the shots are."""
+NEAREST = 4
+"""Blockers of a row in the first round; each later round has as many as those before it."""
+
+FARTHEST = 2**40
+"""A row beyond all others, px."""
 
 FEW_WAYS = 2**8
-"""Most pairs of a way and a blocker that are not looked at closer before their rectangles are."""
+"""Most pairs of a way and a blocker, or a rectangle, that are looked at at once, without sorting some out first."""
 
-ONE_BLOCK = 0, 0, 1, 1
-
-FULL, NO_RECTS = np.uint64(2**64 - 1), np.zeros((0, 4), np.int64)
+FULL = np.uint64(2**64 - 1)
 NO_RECT = np.array([[1, 1, -1, -1]])
 """A rectangle without a pixel, which no way meets."""
-
-
-class Blockers(NamedTuple):
-    """Items that hide what lies behind them, front to back, with the rectangles that cover their masks.
-
-    Parameters
-    ----------
-    rank : (B,) places in the stack
-    box_xyxy : (B, 4) inclusive, px
-    begin : (B + 1,) first rectangle of each
-    rects : (R, 4) inclusive x_min, y_min, x_max, y_max, px, from the corner of the item's mask
-    categories, owner : (B,) category bits and owner; (0,) if all shots are blocked by all of them
-    bounds : box beyond which no item has pixels; None if there is none
-    until_exit : whether an item that the way begins in is ignored up to where the way leaves it
-    """
-
-    rank: Ints
-    box_xyxy: Ints
-    begin: Ints
-    rects: Ints
-    categories: Ints
-    owner: Ints
-    bounds: Box | None
-    until_exit: bool
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes of the columns, without the rectangles, which are kept with the masks."""
-        return sum(int(column.nbytes) for column in (self.rank, self.box_xyxy, self.categories, self.owner))
-
-    def rects_of(self, blocker: Ints, origin_xy: Ints) -> tuple[Ints, Ints]:
-        """Rectangles of blockers (k,), seen from origins (k, 2), as (place in `blocker`, (m, 4)); none is empty."""
-        place, number = ragged((self.begin[1:] - self.begin[:-1])[blocker])
-        seen = self.rects[self.begin[blocker][place] + number]
-        seen += np.tile(self.box_xyxy[blocker, :2], 2)[place]
-        if self.bounds is not None:
-            seen = clipped(seen, self.bounds)
-            kept = ((seen[:, 0] <= seen[:, 2]) & (seen[:, 1] <= seen[:, 3])).nonzero()[0]
-            place, seen = place[kept], seen[kept]
-        seen -= np.tile(origin_xy, 2)[place]
-        return place, seen
-
-
-class Covers:
-    """Rectangles that cover masks, block by block, by the number of the mask; the last ones asked for are kept."""
-
-    def __init__(self) -> None:
-        self._of_block: LruCache[tuple[int, int, int], Ints] = LruCache(
-            COVERS_BYTES, lambda rects: rects.nbytes + MASK_BYTES
-        )
-        self._of_masks: LruCache[bytes, tuple[Ints, Ints]] = LruCache(
-            COVERS_BYTES, lambda made: made[0].nbytes + made[1].nbytes, len
-        )
-
-    def of(
-        self, number: Ints, mask_of: Callable[[int], Bools], boxes_xyxy: Ints, near_xyxy: Box | None
-    ) -> tuple[Ints, Ints]:
-        """Begin (B + 1,) of the rectangles of each mask, and all rectangles (R, 4), from its corner.
-
-        Parameters
-        ----------
-        number : (B,) numbers of masks
-        mask_of : returns the mask (h, w) of a place in `number`
-        boxes_xyxy : (B, 4) boxes of the masks
-        near_xyxy : box that large masks are covered in, or a little more; None for all of them
-        """
-
-        def made() -> tuple[Ints, Ints]:
-            counts, every = [0], [NO_RECTS]
-            for row, mask in enumerate(number.tolist()):
-                x, y, x_end, y_end = blocks.get(row, ONE_BLOCK)
-                places = product(range(y, y_end), range(x, x_end))
-                rects = [self._of_block.get((mask, *at), partial(_rectangles_of, mask_of, row, at)) for at in places]
-                counts.append(sum(map(len, rects)))
-                every += rects
-            return np.cumsum(counts), np.concatenate(every)
-
-        blocks = _blocks_of_large(boxes_xyxy, near_xyxy)
-        key = number.tobytes() + str(blocks).encode() if blocks else number.tobytes()
-        return self._of_masks.get(key, made)
-
-
-def _blocks_of_large(boxes_xyxy: Ints, near_xyxy: Box | None) -> dict[int, tuple[int, ...]]:
-    """First, and last + 1, column and row of the blocks of large boxes (B, 4) that may meet a box, by their row."""
-    size = boxes_xyxy[:, 2:] - boxes_xyxy[:, :2]
-    if size.max(initial=0) < BLOCK:
-        return {}
-    large = (size.max(axis=1) >= BLOCK).nonzero()[0]
-    first, end = np.zeros((len(large), 2), np.int64), size[large] // BLOCK + 1
-    if near_xyxy is not None:
-        near = np.array(near_xyxy) - np.tile(boxes_xyxy[large, :2], 2)
-        first, end = np.maximum(near[:, :2] // BLOCK, 0), np.minimum(near[:, 2:] // BLOCK + 1, end)
-    return dict(zip(large.tolist(), map(tuple, np.concatenate([first, end], axis=1).tolist()), strict=True))
-
-
-def _rectangles_of(mask_of: Callable[[int], Bools], row: int, block: tuple[int, int]) -> Ints:
-    """Rectangles of a block of a mask, from the corner of the mask."""
-    y, x = (BLOCK * place for place in block)
-    rects: Ints = rectangles(mask_of(row)[y : y + BLOCK, x : x + BLOCK]) + np.array([x, y, x, y])
-    return rects
 
 
 def ways_met(boxes_xyxy: Ints, origin_xy: Ints, blockers: Blockers) -> Iterator[tuple[Ints, Ints]]:
@@ -173,6 +71,26 @@ def ways_met(boxes_xyxy: Ints, origin_xy: Ints, blockers: Blockers) -> Iterator[
         yield row + begin, blocker
 
 
+def nearest_first(row: Ints, blocker: Ints, origin_xy: Ints, blockers: Blockers) -> Iterator[tuple[Ints, Ints]]:
+    """Sorted pairs (k,) of a row and a blocker, in rounds: those of blockers near the row's origin come first.
+
+    In a crowd few blockers leave most rows dark, and what is dark has to be asked no others. Those around the origin
+    come last, as what is ignored up to an exit takes long.
+    """
+    if len(row) <= FEW_WAYS:
+        yield row, blocker
+        return
+    box, origin = blockers.box_xyxy[blocker], origin_xy[row]
+    distance = np.abs(box[:, :2] + box[:, 2:] - 2 * origin).max(axis=1)
+    if blockers.until_exit:
+        distance[((box[:, :2] <= origin) & (origin <= box[:, 2:])).all(axis=1)] = FARTHEST
+    order = np.lexsort((distance, row))
+    turn = np.frexp((np.arange(len(row)) - row.searchsorted(row)) // NEAREST)[1]
+    for number in range(int(turn.max()) + 1):
+        now = order[turn == number]
+        yield row[now], blocker[now]
+
+
 def all_ways_met(boxes_xyxy: Ints, origin_xy: Ints, blockers: Blockers) -> tuple[Ints, Ints]:
     """All pairs of `ways_met`."""
     row, blocker = zip(*ways_met(boxes_xyxy, origin_xy, blockers), strict=True)
@@ -182,9 +100,18 @@ def all_ways_met(boxes_xyxy: Ints, origin_xy: Ints, blockers: Blockers) -> tuple
 def begun_in(origin_xy: Ints, blockers: Blockers) -> tuple[Ints, Ints]:
     """Sorted pairs (row, blocker) of origins (n, 2) that lie on a blocker."""
     row, blocker = all_ways_met(np.tile(origin_xy, 2), origin_xy, blockers)
-    place, rects = blockers.rects_of(blocker, origin_xy[row])
-    begun = sorted_once(place[_holds_origin(rects)])
+    begun = _begun(origin_xy[row], blockers, blocker)[0]
     return row[begun], blocker[begun]
+
+
+def _begun(origin_xy: Ints, blockers: Blockers, blocker: Ints) -> tuple[Ints, Ints, Ints, Ints]:
+    """Ways (k,) that begin in their blocker: (place of the way, rectangles (m, 4), first rectangle, their number)."""
+    box = blockers.box_xyxy[blocker]
+    near = np.flatnonzero(((box[:, :2] <= origin_xy) & (origin_xy <= box[:, 2:])).all(axis=1))
+    place, rects, _ = blockers.rects_of(blocker[near], origin_xy[near])
+    begun = sorted_once(place[((rects[:, :2] <= 0) & (rects[:, 2:] >= 0)).all(axis=1)])
+    first = place.searchsorted(begun)
+    return near[begun], rects, first, place.searchsorted(begun, side="right") - first
 
 
 # house: hit rule of areas
@@ -222,6 +149,82 @@ def shadow(rects: Ints, y: Ints) -> tuple[Floats, Floats, Floats, Floats]:
     return first, last, np.where(alone, side, bare_first), np.where(alone, side, bare_last)
 
 
+class Edges(NamedTuple):
+    """Rectangles, seen from origins, and the rows in which each is looked at by itself.
+
+    Parameters
+    ----------
+    place : (n,) number of the way, rising
+    low, high : (n,) first and last row
+    boxes : (n, 4) inclusive sides, px
+    """
+
+    place: Ints
+    low: Ints
+    high: Ints
+    boxes: Ints
+
+    def columns(self, which: Ints, y: Ints) -> tuple[Floats, Floats, Floats, Floats]:
+        """Columns that some hide in rows; see `shadow`."""
+        return shadow(self.boxes[which], y)
+
+
+class Wedges(NamedTuple):
+    """Connected parts of masks, seen from origins, and the rows beyond each, in which it hides one interval.
+
+    Parameters
+    ----------
+    place, low, high, boxes : as of `Edges`
+    first, last : (2, n) first and last column over the distance of the row, as numerators and denominators
+    """
+
+    place: Ints
+    low: Ints
+    high: Ints
+    boxes: Ints
+    first: Ints
+    last: Ints
+
+    def columns(self, which: Ints, y: Ints) -> tuple[Floats, Floats, Floats, Floats]:
+        """Columns that some hide in rows; none are left bare."""
+        (left, top), (right, low) = self.first[:, which].astype(np.float64), self.last[:, which].astype(np.float64)
+        away, none = np.abs(y), np.full(len(y), np.inf)
+        return np.ceil(left * away / top), np.floor(right * away / low), none, -none
+
+
+def seen_from(origin_xy: Ints, blockers: Blockers, blocker: Ints) -> Sequence[Wedges | Edges]:
+    """Blockers (k,) as seen from origins (k, 2).
+
+    A part that lies above or below the origin as a whole has a connected shadow, as its rectangles touch: beyond it,
+    that of all of them is what lies between the outermost corners. Of few rectangles each is looked at in all rows.
+    """
+    place, rects, new = blockers.rects_of(blocker, origin_xy)
+    if len(place) <= FEW_WAYS:
+        every = np.full(len(place), FARTHEST)
+        return [Edges(place, -every, every, rects)]
+    new |= begins(place)
+    begin, part = new.nonzero()[0], np.cumsum(new) - 1
+    x_min, y_min, x_max, y_max = rects.T
+    least, most = np.minimum.reduceat, np.maximum.reduceat
+    boxes = np.stack([least(x_min, begin), least(y_min, begin), most(x_max, begin), most(y_max, begin)], axis=1)
+    down, up = (boxes[:, 1] > 0)[part], (boxes[:, 3] < 0)[part]
+    low = np.where(up, boxes[part, 1], np.where(down, y_min, -FARTHEST))
+    high = np.where(down, boxes[part, 3], np.where(up, y_max, FARTHEST))
+    near, far = 2 * np.where(down, y_min, -y_max) - 1, 2 * np.where(down, y_max, -y_min) + 1
+    sides = []
+    for side in (2 * x_min - 1, -2 * x_max - 1):  # in halves of a pixel, to the right, and to the left
+        away = np.where(side < 0, near, far)
+        slope = side / away  # of numbers below 2**22: different ones are different as floats, too
+        corner = (slope == least(slope, begin)[part]).nonzero()[0]
+        corner = corner[begins(part[corner])]
+        sides.append(np.stack([side[corner], away[corner]]))
+    apart = ((boxes[:, 1] > 0) | (boxes[:, 3] < 0)).nonzero()[0]
+    (left, right), under = (side[:, apart] for side in sides), boxes[apart, 1] > 0
+    rows = np.where(under, boxes[apart, 3] + 1, -FARTHEST), np.where(under, FARTHEST, boxes[apart, 1] - 1)
+    right[0] *= -1
+    return [Wedges(place[begin[apart]], *rows, boxes[apart], left, right), Edges(place, low, high, rects)]
+
+
 def hide_behind(rows: Words, corner_xy: Ints, origin_xy: Ints, blockers: Blockers, pair: Ints, blocker: Ints) -> None:
     """Clear the pixels (n, height) that blockers shelter from their origins.
 
@@ -233,21 +236,31 @@ def hide_behind(rows: Words, corner_xy: Ints, origin_xy: Ints, blockers: Blocker
     """
     if blockers.until_exit:
         pair, blocker = hide_after_exit(rows, corner_xy, origin_xy, blockers, pair, blocker)
-    height, corner = rows.shape[1], corner_xy - origin_xy
-    place, rects = blockers.rects_of(blocker, origin_xy[pair])
-    own = pair[place]
-    kept = _between(rects, (sides_of(rows) + np.tile(corner, 2))[own]).nonzero()[0]
-    own, rects, (left, top) = own[kept], rects[kept], corner[own[kept]].T
-    step = max(ROWS_AT_ONCE // height, 1)
-    for begin in range(0, len(own), step):
-        now = slice(begin, begin + step)
-        rect, row = rows[own[now]].nonzero()
-        first, last, bare_first, bare_last = shadow(rects[now][rect], top[now][rect] + row)
-        hidden = np.zeros((len(own[now]), height), np.uint64)
-        columns = left[now][rect]
-        hidden[rect, row] = _columns(first, last, columns) & ~_columns(bare_first, bare_last, columns)
-        new = begins(own[now]).nonzero()[0]
-        rows[own[now][new]] &= ~np.bitwise_or.reduceat(hidden, new, axis=0)
+    corner = corner_xy - origin_xy
+    for seen in seen_from(origin_xy[pair], blockers, blocker):
+        own, box = pair[seen.place], sides_of(rows) + np.tile(corner, 2)
+        box = box[own]
+        met = (seen.low <= box[:, 3]) & (seen.high >= box[:, 1]) & (np.bitwise_or.reduce(rows, axis=1)[own] != 0)
+        which = met.nonzero()[0]
+        which = which[_between(seen.boxes[which], box[which])]
+        step = max(ROWS_AT_ONCE // rows.shape[1], 1)
+        for begin in range(0, len(which), step):
+            now = which[begin : begin + step]
+            _hide(rows, corner, own[now], seen, now)
+
+
+def _hide(rows: Words, corner: Ints, own: Ints, seen: Edges | Wedges, which: Ints) -> None:
+    """Clear the pixels of rows `own` that some rectangles or wedges hide; `corner` is that of all rows, from (0, 0)."""
+    rect, row = rows[own].nonzero()
+    left, y = corner[own[rect]].T
+    y = y + row
+    inside = ((seen.low[which[rect]] <= y) & (y <= seen.high[which[rect]])).nonzero()[0]
+    rect, row, left = rect[inside], row[inside], left[inside]
+    first, last, bare_first, bare_last = seen.columns(which[rect], y[inside])
+    hidden = np.zeros((len(own), rows.shape[1]), np.uint64)
+    hidden[rect, row] = _columns(first, last, left) & ~_columns(bare_first, bare_last, left)
+    new = begins(own).nonzero()[0]
+    rows[own[new]] &= ~np.bitwise_or.reduceat(hidden, new, axis=0)
 
 
 def hide_after_exit(
@@ -257,21 +270,14 @@ def hide_after_exit(
 
     Parameters are those of `hide_behind`. Returned are the other pairs, of ways that begin elsewhere.
     """
-    origin, box = origin_xy[pair], blockers.box_xyxy[blocker]
-    near = np.flatnonzero(((box[:, :2] <= origin) & (origin <= box[:, 2:])).all(axis=1))
-    place, rects = blockers.rects_of(blocker[near], origin[near])
-    begun = sorted_once(place[_holds_origin(rects)])
-    own, first = pair[near[begun]], place.searchsorted(begun)
-    count = place.searchsorted(begun, side="right") - first
-    about = np.ceil(np.log2(count)).astype(np.int64)
+    begun, rects, first, count = _begun(origin_xy[pair], blockers, blocker)
+    own, about = pair[begun], np.ceil(np.log2(count)).astype(np.int64)
     for size in sorted_once(about).tolist():  # blockers of about as many rectangles are looked at together
         alike = np.flatnonzero(about == size)
         for part in pieces(np.full(len(alike), rows.shape[1] * WORD), CHUNK_SAMPLES):
             now = alike[part]
             _clear_after_exit(rows, corner_xy - origin_xy, own[now], rects, first[now], count[now])
-    apart = np.ones(len(pair), np.bool_)
-    apart[near[begun]] = False
-    return pair[apart], blocker[apart]
+    return np.delete(pair, begun), np.delete(blocker, begun)
 
 
 def _clear_after_exit(rows: Words, corner_xy: Ints, own: Ints, rects: Ints, first: Ints, count: Ints) -> None:
@@ -291,12 +297,19 @@ def _clear_after_exit(rows: Words, corner_xy: Ints, own: Ints, rects: Ints, firs
         new = begins(pair[now])
         here, which = pair[now][new], np.cumsum(new) - 1
         of_pair = every[np.where(place < count[here, None], first[here, None] + place, -1)]
-        again = kernels_of(sys.modules[__name__]).left_and_met(of_pair, which, x[now], y[now])
-        of_pixel = of_pair[which[again]].swapaxes(0, 1)
-        again += begin
-        hidden = again[_times(of_pixel, x[again], y[again], True)[0].any(axis=0)]
+        hidden = _met_after_exit(of_pair, which, x[now], y[now]) + begin
         pixels = ~(np.uint64(1) << column[hidden].astype(np.uint64))
         np.bitwise_and.at(rows, (own[pair[hidden]], bit[hidden]), pixels)
+
+
+def _met_after_exit(rects: Ints, item: Ints, x: Ints, y: Ints) -> Ints:
+    """Pixels (s,) that an item, in which the way to them begins, shelters once the way has left it.
+
+    Parameters are those of `left_and_met`.
+    """
+    again = kernels_of(sys.modules[__name__]).left_and_met(rects, item, x, y)
+    hidden = _times(rects[item[again]].swapaxes(0, 1), x[again], y[again], True)[0].any(axis=0)
+    return np.asarray(again[hidden])
 
 
 def _pixels_of(rows: Words) -> tuple[Ints, Ints, Ints]:
@@ -432,48 +445,52 @@ def _hidden(
 ) -> tuple[Ints, Ints, Ints, Ints]:
     """Stretches of runs that blockers shelter, as (pair, run, x_first, x_last); those of a pair may overlap."""
     x, y = origin_xy[placement].T
-    pair, rects = blockers.rects_of(blocker, origin_xy[placement])
-    found = []
+    origin, pair, found = origin_xy[placement], np.arange(len(placement)), []
     if blockers.until_exit:
-        pair, rects, begun = _begun_apart(pair, rects)
-        found = [_hidden_after_exit(runs, placement[k], k, x[k], y[k], inside) for k, inside in begun]
-    begin, end = (runs.placement.searchsorted(placement, side=side) for side in ("left", "right"))
-    rows = (end - begin)[pair]
-    for piece in pieces(rows, CHUNK_SAMPLES):
-        rect, place = ragged(rows[piece])
-        own = pair[piece][rect]
-        run = begin[own] + place
-        first, last, bare_first, bare_last = shadow(rects[piece][rect], runs.y[run] - y[own])
-        first, last = np.maximum(first, runs.x_first[run] - x[own]), np.minimum(last, runs.x_last[run] - x[own])
-        bare = (bare_first <= bare_last).nonzero()[0]
-        after = np.maximum(bare_last[bare] + 1, first[bare]), last[bare]
-        last[bare] = np.minimum(bare_first[bare] - 1, last[bare])
-        for own_part, run_part, low, high in ((own, run, first, last), (own[bare], run[bare], *after)):
-            kept = (low <= high).nonzero()[0]
-            shift = x[own_part[kept]]
-            left, right = (side[kept].astype(np.int64) + shift for side in (low, high))
-            found.append((own_part[kept], run_part[kept], left, right))
+        begun, rects, begin, count = _begun(origin, blockers, blocker)
+        for k, first, number in zip(begun.tolist(), begin.tolist(), count.tolist(), strict=True):
+            found += _hidden_after_exit(runs, placement[k], k, origin[k], rects[first : first + number])
+        pair = np.delete(pair, begun)
+    for seen in seen_from(origin[pair], blockers, blocker[pair]):
+        of = pair[seen.place]
+        begin, end = _runs_of_rows(runs, placement[of], seen.low + origin[of, 1], seen.high + origin[of, 1])
+        for piece in pieces(np.maximum(end - begin, 0), CHUNK_SAMPLES):
+            rect, place = ragged(np.maximum(end - begin, 0)[piece])
+            rect += piece.start
+            run, (x, y) = begin[rect] + place, origin[of[rect]].T
+            first, last, bare_first, bare_last = seen.columns(rect, runs.y[run] - y)
+            first, last = np.maximum(first, runs.x_first[run] - x), np.minimum(last, runs.x_last[run] - x)
+            bare = (bare_first <= bare_last).nonzero()[0]
+            after = np.maximum(bare_last[bare] + 1, first[bare]), last[bare]
+            last[bare] = np.minimum(bare_first[bare] - 1, last[bare])
+            for every, low, high in ((slice(None), first, last), (bare, *after)):
+                kept = (low <= high).nonzero()[0]
+                own, shift = of[rect[every][kept]], x[every][kept]
+                stretch = (side[kept].astype(np.int64) + shift for side in (low, high))
+                found.append((own, run[every][kept], *stretch))
     columns = [np.concatenate(column) for column in zip(*found, strict=True)]
     return columns[0], columns[1], columns[2], columns[3]
 
 
-def _begun_apart(pair: Ints, rects: Ints) -> tuple[Ints, Ints, list[tuple[int, Ints]]]:
-    """Rectangles (m, 4) of pairs, without those of blockers that the way begins in, which follow as (pair, rects)."""
-    begun = sorted_once(pair[_holds_origin(rects)])
-    apart = np.isin(pair, begun)
-    return pair[~apart], rects[~apart], [(k, rects[pair == k]) for k in begun.tolist()]
+def _runs_of_rows(runs: Runs, placement: Ints, low: Ints, high: Ints) -> tuple[Ints, Ints]:
+    """First run, and last + 1, of placements (k,) in rows `low` .. `high`; none if it is not below the last."""
+    top, end = int(runs.y.min(initial=0)), int(runs.y.max(initial=0)) + 1
+    line, before = runs.placement * (end - top + 1) + runs.y - top, placement * (end - top + 1) - top
+    return line.searchsorted(before + np.clip(low, top, end)), line.searchsorted(
+        before + np.clip(high, top - 1, end) + 1
+    )
 
 
-def _holds_origin(rects: Ints) -> Bools:
-    return np.asarray(((rects[:, :2] <= 0) & (rects[:, 2:] >= 0)).all(axis=1))
-
-
-def _hidden_after_exit(runs: Runs, placement: int, pair: int, x: int, y: int, rects: Ints) -> tuple[Ints, ...]:
+def _hidden_after_exit(runs: Runs, placement: int, pair: int, origin_xy: Ints, rects: Ints) -> list[tuple[Ints, ...]]:
     """Pixels of runs of a placement that a blocker shelters once the way has left it: (pair, run, x_first, x_last)."""
-    own = (runs.placement == placement).nonzero()[0]
-    run, column = each_pixel(runs.x_first[own], runs.x_last[own])
-    hidden = _times(rects[:, None], column - x, runs.y[own][run] - y, True)[0].any(axis=0)
-    return np.full(int(hidden.sum()), pair), own[run[hidden]], column[hidden], column[hidden]
+    own, (left, top) = (runs.placement == placement).nonzero()[0], origin_xy.tolist()
+    found: list[tuple[Ints, ...]] = []
+    for piece in pieces(runs.lengths[own] * len(rects), CHUNK_SAMPLES):
+        run, column = each_pixel(runs.x_first[own[piece]], runs.x_last[own[piece]])
+        run = own[piece][run]
+        hidden = _met_after_exit(rects[None], np.zeros_like(run), column - left, runs.y[run] - top)
+        found.append((np.full(len(hidden), pair), run[hidden], column[hidden], column[hidden]))
+    return found
 
 
 def _times(rects: Ints, x: Ints, y: Ints, until_exit: bool) -> tuple[Bools, Ints]:
@@ -524,7 +541,8 @@ def sheltered_by(
         these = these[own[these] != rank]
         rects = blockers.rects_of(np.array([b]), origin_xy[p][None])[1]
         x, y = (xy[these] - origin_xy[p]).T
-        hidden, entry = _times(rects[:, None], x, y, blockers.until_exit and bool(_holds_origin(rects).any()))
+        begun = len(_begun(origin_xy[p][None], blockers, np.array([b]))[0]) > 0
+        hidden, entry = _times(rects[:, None], x, y, blockers.until_exit and begun)
         time = np.where(hidden, entry, NEVER).min(axis=0, initial=NEVER)
         sooner = time < soonest[these]
         soonest[these[sooner]], blocker_rank[these[sooner]] = time[sooner], rank

@@ -162,7 +162,9 @@ class Spans:
         if type(origin_xy) is not tuple or [*map(type, origin_xy)] != [int, int]:
             x, y = integers("origin_xy", origin_xy, (2,), -POSITION_MAX, POSITION_MAX).tolist()
             origin_xy = x, y
-        edges = np.diff(np.pad(mask, ((0, 0), (1, 1))).astype(np.int8), axis=1)
+        padded = np.zeros((mask.shape[0], mask.shape[1] + 2), np.int8)
+        padded[:, 1:-1] = mask
+        edges = padded[:, 1:] - padded[:, :-1]
         y, x_first = np.nonzero(edges == 1)
         x_last = np.nonzero(edges == -1)[1] - 1
         return cls(y + origin_xy[1], x_first + origin_xy[0], x_last + origin_xy[0])

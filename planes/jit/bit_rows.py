@@ -12,6 +12,7 @@ from numba.extending import intrinsic
 
 from ..bits import bit_rows, shadows
 from ..bits.bit_rows import NO_STRIPS, NO_SUMS, WORD, PatternBits, Words
+from ..bits.blockers import Blockers
 from ..common.backend import in_parts
 from ..common.checks import Ints
 from ..common.limits import GOLDEN, SUB
@@ -270,9 +271,7 @@ def left_and_met(rects: Ints, item: Ints, x: Ints, y: Ints) -> Ints:
     return again[: _left_and_met(rects, item, x, y, again)]
 
 
-def hide_behind(
-    rows: Words, corner_xy: Ints, origin_xy: Ints, blockers: shadows.Blockers, pair: Ints, blocker: Ints
-) -> None:
+def hide_behind(rows: Words, corner_xy: Ints, origin_xy: Ints, blockers: Blockers, pair: Ints, blocker: Ints) -> None:
     """See `bits.shadows.hide_behind`."""
     if blockers.until_exit:
         pair, blocker = shadows.hide_after_exit(rows, corner_xy, origin_xy, blockers, pair, blocker)

@@ -27,9 +27,9 @@ from ..common.limits import EVERYTHING, STRUCTURES
 from ..grid.spans import Box
 
 if TYPE_CHECKING:
+    from ..bits.blockers import Covers
     from ..bits.distance_field import DistanceField
     from ..bits.label_plane import LabelPlane
-    from ..bits.shadows import Covers
     from ..bits.tiles import TileAtlas
     from ..bits.visible import Visible
     from ..broadphase.boxes import Index

@@ -27,6 +27,7 @@ from .sprite import Sprite
 from .variants import MaskAtlas, Transform, Variant, surely_fits, variants_of
 
 if TYPE_CHECKING:
+    from ..bits.blockers import Cover
     from ..bits.tiles import Tiles
     from ..volumes.volumes import Volumes
 
@@ -557,9 +558,9 @@ class Items:
         variants, rows = self.variants, stack.rows
         return atlas.tiles(lambda rank: variants[rows[rank]].mask, self.mask.take(rows), stack.arrangement)
 
-    def covers(self, rows: Ints, boxes_xyxy: Ints, near_xyxy: Box | None) -> tuple[Ints, Ints]:
-        """Rectangles that cover the masks of items (B,); see `bits.shadows.Covers.of`."""
-        covers = self.by_mask.covers = self.by_mask.covers or late.shadows.Covers()
+    def covers(self, rows: Ints, boxes_xyxy: Ints, near_xyxy: Box | None) -> tuple[Ints, Cover]:
+        """Rectangles that cover the masks of items (B,); see `bits.blockers.Covers.of`."""
+        covers = self.by_mask.covers = self.by_mask.covers or late.blockers.Covers()
         return covers.of(self.mask.take(rows), lambda k: self.variants[rows[k]].mask, boxes_xyxy, near_xyxy)
 
     def bounding(self, kind: str, rows: Ints) -> tuple[Volumes, Ints]:

@@ -33,7 +33,7 @@ from ..kinds.weapon import Pattern, Swept
 from .plan import Plan
 
 if TYPE_CHECKING:
-    from hitplanes.planes.bits.shadows import Blockers
+    from hitplanes.planes.bits.blockers import Blockers
     from hitplanes.planes.broadphase.boxes import Index
     from hitplanes.planes.volumes.volumes import Capsules, Volumes
 

@@ -20,7 +20,8 @@ from ..kinds.weapon import Weapon
 from .prefilter import refused
 
 if TYPE_CHECKING:
-    from hitplanes.planes.bits.shadows import Blockers, Shelter
+    from hitplanes.planes.bits.blockers import Blockers
+    from hitplanes.planes.bits.shadows import Shelter
     from hitplanes.planes.bits.span_walk import Runs
     from hitplanes.planes.scene.derived import View
 
@@ -68,12 +69,13 @@ def blockers_of(
         return None
     boxes_xyxy = stack.box_xyxy[rank]
     if stack.arrangement == scene.items.arrangement:
-        rects = scene.items.covers(stack.rows[rank], boxes_xyxy, near_xyxy)
+        begin, cover = scene.items.covers(stack.rows[rank], boxes_xyxy, near_xyxy)
     else:  # the masks of then may be gone from the scene
-        rects = late.shadows.Covers().of(np.arange(len(rank)), lambda row: stack.mask(rank[row]), boxes_xyxy, near_xyxy)
+        of = np.arange(len(rank))
+        begin, cover = late.blockers.Covers().of(of, lambda row: stack.mask(rank[row]), boxes_xyxy, near_xyxy)
     whose = (stack.categories[rank], stack.owner[rank]) if view is None else (rank[:0], rank[:0])
     leaves = inside == "ignore_until_exit"
-    return late.shadows.Blockers(rank, boxes_xyxy, *rects, *whose, scene.bounds, leaves)
+    return late.blockers.Blockers(rank, boxes_xyxy, begin, *cover, *whose, scene.bounds, leaves)
 
 
 def _near(runs: Runs, placements: Placements, shots: Shots, stack: Stack, blockers: Blockers) -> tuple[Ints, Ints]:
