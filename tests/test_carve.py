@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from examples import examples
-from hypothesis import given
+from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 
 from hitplanes import (
@@ -30,6 +30,8 @@ from hitplanes import (
     load_scene,
     prepare,
 )  # fmt: skip
+from hitplanes.planes.bits import tiles as tiles_module
+from hitplanes.planes.bits.tiles import WORD, TileAtlas
 from hitplanes.planes.grid.spans import Spans
 from hitplanes.planes.scene.carving import cells_per_px
 from hitplanes.planes.scene.items import Items
@@ -366,6 +368,72 @@ def test_holes_are_mapped_alike_by_compiled_kernels(jit: None) -> None:
 
 
 # What is refused
+
+
+# What is kept of masks
+
+
+def tiles_of(items: Items) -> list[Any]:
+    """Rank, box and rows of each tile of the stack."""
+    return pictured(items.tiles())
+
+
+def tiles_made_anew(items: Items) -> list[Any]:
+    """The same of an atlas that has seen no mask before."""
+    stack = items.stack()
+    return pictured(TileAtlas().tiles(lambda rank: stack.mask(rank).copy(), np.arange(len(stack)), 0))
+
+
+def pictured(tiles: Any) -> list[Any]:
+    words = [tiles.words[begin - WORD : begin + 2 * WORD].tolist() for begin in tiles.begin.tolist()]
+    return [tiles.rank.tolist(), tiles.inside_xyxy.tolist(), words, bool(tiles.whole)]
+
+
+@examples(60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.integers(0, 2**32), st.sampled_from([0, 4, 4096]), st.sampled_from([2, 1024]))
+def test_tiles_of_carved_masks_are_those_made_anew(
+    monkeypatch: pytest.MonkeyPatch, seed: int, slack: int, most: int
+) -> None:
+    """Whether they were read between two holes or not; also in the past, and of items that shared a mask."""
+    monkeypatch.setattr(tiles_module, "ATLAS_SLACK", slack)
+    monkeypatch.setattr(tiles_module, "PACKED_AT_ONCE", most)
+    rng = random.Random(seed)
+    scene = Scene()
+    sprite = Sprite.from_mask(np.random.default_rng(seed).random((150, 200)) < rng.choice([0.02, 0.6, 1]))
+    hills = [scene.add(sprite, (100, 75)), scene.add(sprite, (300, 75)), scene.add(Sprite.circle(70), (100, 300))]
+    history, handed = History(scene, ticks=40), []
+    for _ in range(rng.choice([4, 12, 30])):
+        hill = rng.choice(hills)
+        x, y, x_end, y_end = scene.box(hill).tolist()
+        left, top = rng.randint(x - 9, x_end), rng.randint(y - 9, y_end)
+        size = rng.choice([1, 9, 70])
+        scene.carve({hill: [(left + i, top + j) for i in range(size) for j in range(rng.choice([1, size]))]})
+        if rng.random() < 0.2:
+            scene.add(sprite, (500, 75))
+        if rng.random() < 0.5:
+            history.record()
+        if rng.random() < 0.5:
+            assert tiles_of(scene.items) == tiles_made_anew(scene.items)
+            handed.append((scene.items.tiles(), tiles_of(scene.items)))
+        if history.ticks and rng.random() < 0.3:
+            past = history.at(rng.choice(history.ticks)).items
+            assert tiles_of(past) == tiles_made_anew(past)
+    assert all(pictured(tiles) == told for tiles, told in handed), "tiles that were handed out changed"
+
+
+def test_only_the_tiles_that_holes_meet_are_packed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Several holes may be shot before the tiles are read again."""
+    scene = Scene()
+    hill = scene.add(np.ones((640, 1280), np.bool_), (640, 320))
+    fire(scene, Disc(9), (100, 100), strategy="tiles")
+    packed, inner = [], tiles_module.packed
+    monkeypatch.setattr(tiles_module, "packed", lambda masks: packed.append(len(masks)) or inner(masks))
+    for holes, expected in (([(32, 32)], 1), ([(200, 96), (200, 128), (330, 330)], 3), ([(128, 128)], 4)):
+        for x, y in holes:
+            scene.carve({hill: [(x + i, y + j) for i in (-1, 0, 1) for j in (-1, 0, 1)]})
+        hits = fire(scene, Disc(9), holes[-1], strategy="tiles")
+        assert hits == fire(made_anew(scene), Disc(9), holes[-1], strategy="spans")
+        assert packed.pop(0) == expected and not packed
 
 
 def test_hits_must_be_of_the_scene_as_it_is() -> None:

@@ -24,8 +24,9 @@ import numpy.typing as npt
 from ..common import costs
 from ..common.checks import Bools, Ints
 from ..common.limits import WEIGHT_FULL
-from ..grid.spans import Box, Spans, ragged
+from ..grid.spans import Box, Spans, meets, ragged
 from ..scene.items import Stack
+from ..scene.variants import Carved
 from .bit_rows import WORD, Placed, Sums, Words, packed
 from .front_to_back import NO_NUMBERS, OrderedTiles
 
@@ -347,15 +348,16 @@ class Tiles:
 class TileAtlas:
     """Tiles of masks, by the number of the mask; unused tiles are dropped in time.
 
-    Each has a slot of STRIDE words, which is written once, so that tiles that were handed out never change.
+    Each has a slot of STRIDE words, which is written once, so that tiles that were handed out never change. Those of a
+    mask have rows of columns one after another; a carved mask takes over the rows of the mask before it.
     """
 
     def __init__(self) -> None:
         self.words: Words = np.zeros(4 * STRIDE, np.uint64)
-        self._columns = np.zeros((4, 4), np.int64)  # left, top, width, height
-        self._used = self._enough = 0  # slots; with more than enough, unused tiles are searched
-        self._places: dict[int, tuple[int, int]] = {}  # by mask number: first slot, and count
-        self._number, self._slots = NO_NUMBERS, np.zeros((0, 2), np.int64)  # of the last stack: masks, places
+        self._columns = np.zeros((4, 5), np.int64)  # left, top, width, height, slot
+        self._used = self._enough = 0  # slots, and as many rows; with more than enough, unused tiles are searched
+        self._places: dict[int, tuple[int, int]] = {}  # by mask number: first row, and count
+        self._number, self._rows = NO_NUMBERS, np.zeros((0, 2), np.int64)  # of the last stack: masks, places
         self._last: tuple[int, Tiles] | None = None
         self._bigs: dict[int, BigTiles] = {}
         self._lock = threading.Lock()
@@ -365,7 +367,10 @@ class TileAtlas:
         last = self._last
         return last[1] if last is not None and last[0] == arrangement else None
 
-    def tiles(self, mask_of: Callable[[int], Bools], number: Ints, arrangement: int) -> Tiles:
+    def tiles(
+        self, mask_of: Callable[[int], Bools], number: Ints, arrangement: int,
+        carved_of: Callable[[int], Carved] = lambda _: (),
+    ) -> Tiles:  # fmt: skip
         """Tiles of the items of a stack.
 
         Parameters
@@ -373,34 +378,36 @@ class TileAtlas:
         mask_of : returns the mask (h, w) of the item of a rank
         number : (M,) number of each item's mask; equal masks may have the same
         arrangement : number of the stack's arrangement; stacks with the same have the same tiles
+        carved_of : returns the masks that the one of a rank was carved out of, see `Variant`
         """
         with self._lock:
             if self._last is None or self._last[0] != arrangement:
-                self._last = arrangement, self._listed(*self._found(mask_of, number))
+                self._last = arrangement, self._listed(*self._found(mask_of, number, carved_of))
             return self._last[1]
 
     def _listed(self, first: Ints, count: Ints) -> Tiles:
-        """Tiles of masks (M,), each in `count` slots from `first` on."""
+        """Tiles of masks (M,), each in `count` rows from `first` on."""
         whole = bool((count == 1).all())
         rank, place = (np.arange(len(count)), 0) if whole else ragged(count)
-        slot = first[rank] + place
-        columns = self._columns.take(slot, axis=0)
+        columns = self._columns.take(first[rank] + place, axis=0)
         whole &= not columns[:, :2].any()
-        inside = np.concatenate([columns[:, :2], columns[:, :2] + columns[:, 2:] - 1], axis=1)
-        return Tiles(rank, inside, slot * STRIDE + WORD, self.words, whole, self._bigs)
+        return Tiles(rank, _boxes_of(columns), columns[:, 4] * STRIDE + WORD, self.words, whole, self._bigs)
 
-    def _found(self, mask_of: Callable[[int], Bools], number: Ints) -> Ints:
-        """First slot and count (2, M) of each mask of a stack; masks that the atlas does not hold are added."""
-        if len(self._number) != len(number) or self._used > self._enough:
+    def _found(self, mask_of: Callable[[int], Bools], number: Ints, carved_of: Callable[[int], Carved]) -> Ints:
+        """First row and count (2, M) of each mask of a stack; masks that the atlas does not hold are added."""
+        every, fresh = np.arange(len(number)), len(self._number) != len(number)
+        changed = every if fresh else np.flatnonzero(self._number != number)
+        masks = zip(number[changed].tolist(), changed.tolist(), strict=True)
+        missing = {mask: rank for mask, rank in masks if mask not in self._places}
+        added = [rank for rank in missing.values() if not self._carve(rank, mask_of, number, carved_of(rank))]
+        if fresh or self._used > self._enough:
             self._drop_unused(number)
-            self._number, self._slots = np.full(len(number), -1), np.zeros((len(number), 2), np.int64)
-        changed = np.flatnonzero(self._number != number)
-        numbers = number[changed].tolist()
-        missing = {mask: rank for mask, rank in zip(numbers, changed.tolist(), strict=True) if mask not in self._places}
-        self._add([(mask, mask_of(rank)) for mask, rank in missing.items()])
-        self._slots[changed] = np.array([self._places[mask] for mask in numbers], np.int64).reshape(-1, 2)
+            changed, self._rows = every, np.zeros((len(number), 2), np.int64)
+        self._add([(number.item(rank), mask_of(rank)) for rank in added])
+        places = [self._places[mask] for mask in number[changed].tolist()]
+        self._rows[changed] = np.array(places, np.int64).reshape(-1, 2)
         self._number = number
-        return self._slots.T
+        return self._rows.T
 
     def _drop_unused(self, number: Ints) -> None:
         """Keep only the tiles of the given masks, if that halves the atlas."""
@@ -411,15 +418,17 @@ class TileAtlas:
         if self._used <= self._enough:
             return
         which, place = ragged(count)
-        slots, words, columns = first[which] + place, self.words.reshape(-1, STRIDE), self._columns
+        columns, words = self._columns[first[which] + place], self.words.reshape(-1, STRIDE)
         self._allot(max(2 * kept, 4))
-        self.words.reshape(-1, STRIDE)[:kept], self._columns[:kept] = words[slots], columns[slots]
+        self.words.reshape(-1, STRIDE)[:kept] = words[columns[:, 4]]
+        columns[:, 4] = np.arange(kept)
+        self._columns[:kept] = columns
         begin = (np.cumsum(count) - count).tolist()
         self._places = dict(zip(used, zip(begin, count.tolist(), strict=True), strict=True))
         self._used, self._bigs = kept, {}
 
     def _allot(self, slots: int) -> None:
-        self.words, self._columns = np.zeros(slots * STRIDE, np.uint64), np.zeros((slots, 4), np.int64)
+        self.words, self._columns = np.zeros(slots * STRIDE, np.uint64), np.zeros((slots, 5), np.int64)
 
     def _add(self, masks: Sequence[tuple[int, Bools]]) -> None:
         """Cut masks into tiles; tiles without a pixel are left out."""
@@ -435,20 +444,48 @@ class TileAtlas:
         places = zip((begin + np.cumsum(count) - count).tolist(), count.tolist(), strict=True)
         self._places.update(zip((number for number, _ in masks), places, strict=True))
 
+    def _carve(self, rank: int, mask_of: Callable[[int], Bools], number: Ints, carved: Carved) -> bool:
+        """Make the tiles of a carved mask of those of a mask before it, if the atlas has them and no item uses them.
+
+        Only the few tiles that holes meet are packed. Returned is whether it was done.
+        """
+        ages = [age for age, (before, _) in enumerate(carved) if before in self._places]
+        if not ages or (number == carved[ages[0]][0]).any():
+            return False
+        before, holes = carved[ages[0]][0], np.array([hole for _, hole in carved[: ages[0] + 1]])
+        (first, count), mask, begin = self._places[before], mask_of(rank), self._used
+        boxes = _boxes_of(self._columns[first : first + count])
+        met = np.flatnonzero(meets(boxes[:, None], holes).any(axis=1))
+        if len(met) > PACKED_AT_ONCE:
+            return False
+        corners = zip(met.tolist(), boxes[met, :2].tolist(), strict=True)
+        filled = self._put([(row, x, y, mask[y : y + WORD, x : x + WORD]) for row, (x, y) in corners])
+        columns = self._columns[first : first + count]  # `_put` may have laid them out anew
+        columns[filled, 4] = np.arange(begin, self._used)
+        left = np.delete(columns, np.setdiff1d(met, filled), axis=0)
+        columns[: len(left)] = left
+        self._places[number.item(rank)] = self._places.pop(before)[0], len(left)
+        return True
+
     def _put(self, parts: Sequence[tuple[int, int, int, Bools]]) -> Ints:
         """Pack parts (mask, left, top, pixels) into the next slots; return the masks of those that have a pixel."""
         rows = packed([part for *_, part in parts])
         columns = np.array([(which, left, top, *part.shape[::-1]) for which, left, top, part in parts])
         full = np.flatnonzero(rows.any(axis=1))
-        end = self._used + len(full)
+        begin, end = self._used, self._used + len(full)
         if end > len(self._columns):
             old = self.words, self._columns
             self._allot(max(end, 2 * len(old[1])))
             self.words[: len(old[0])], self._columns[: len(old[1])] = old
-        self.words.reshape(-1, STRIDE)[self._used : end, WORD : 2 * WORD] = rows[full]
-        self._columns[self._used : end] = columns[full, 1:]
+        self.words.reshape(-1, STRIDE)[begin:end, WORD : 2 * WORD] = rows[full]
+        self._columns[begin:end, :4], self._columns[begin:end, 4] = columns[full, 1:], np.arange(begin, end)
         self._used = end
         return np.asarray(columns[full, 0])
+
+
+def _boxes_of(columns: Ints) -> Ints:
+    """Inclusive boxes (n, 4) of tiles, from columns of an atlas."""
+    return np.concatenate([columns[:, :2], columns[:, :2] + columns[:, 2:4] - 1], axis=1)
 
 
 Hit = tuple[int, int, int, int, int, int, int]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
@@ -17,7 +18,7 @@ import numpy as np
 from ..common.checks import Bools, InputError, Ints, integers, shown, within
 from ..common.limits import HALF, MASK_AREA_MAX, POSITION_MAX, SUB
 from ..grid.fixed_point import over_one, rounded_div, turned
-from ..grid.spans import Spans
+from ..grid.spans import Box, Spans
 from .sprite import Carving, Sprite, fits, local_grid
 from .variants import ONE, Transform, Variant, cropped, keep_variant
 
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from .scene import Scene
 
 SLACK = 17, 16  # a fraction above 1, by which cells are finer than they must be: it covers all rounding of positions
+CARVED_KNOWN = 16  # most masks before a carved one that it knows: as many holes may be shot between two uses of tiles
 
 
 class HitPixels(Protocol):
@@ -52,7 +54,8 @@ def carved_sprites(items: Items, pixels: Mapping[int, object]) -> tuple[list[Spr
     """New sprites of the items of which pixels go, and how many pixels each of them loses; all by their rows."""
     sprites, lost = [], {}
     for row, xy in pixels.items():
-        variant = replace(items.variants[row], transform=items.transforms[row])  # a circle's is kept unturned
+        variant = copy(items.variants[row])
+        variant.transform = items.transforms[row]  # a circle's is kept unturned
         place = f"pixels[{items.id[row]}]"
         hole = hole_of(place, xy, variant.mask, items.corner(row))
         if count := int(np.count_nonzero(hole.hit)):
@@ -72,6 +75,11 @@ class Hole(NamedTuple):
     def of(self, mask: Bools) -> Bools:
         """The part of the mask that it covers."""
         return mask[self.y : self.y + self.hit.shape[0], self.x : self.x + self.hit.shape[1]]
+
+    @property
+    def box(self) -> Box:
+        """Its inclusive box in the mask."""
+        return self.x, self.y, self.x + self.hit.shape[1] - 1, self.y + self.hit.shape[0] - 1
 
 
 def hole_of(field: str, pixels: object, mask: Bools, corner_xy: tuple[int, int]) -> Hole:
@@ -123,7 +131,8 @@ def _rest_of(variant: Variant, hole: Hole) -> Variant:
         return cropped(variant.transform, mask, (variant.pivot_x, variant.pivot_y))
     mask.flags.writeable = False
     left = variant.area - int(np.count_nonzero(hole.hit))
-    return Variant(variant.transform, mask, variant.pivot_x, variant.pivot_y, left)
+    carved = (variant.uid, hole.box), *variant.carved[: CARVED_KNOWN - 1]
+    return Variant(variant.transform, mask, variant.pivot_x, variant.pivot_y, left, carved)
 
 
 def cells_per_px(transform: Transform) -> int:

@@ -556,7 +556,8 @@ class Items:
         if known is not None:
             return known
         variants, rows = self.variants, stack.rows
-        return atlas.tiles(lambda rank: variants[rows[rank]].mask, self.mask.take(rows), stack.arrangement)
+        number, carved_of = self.mask.take(rows), lambda rank: variants[rows[rank]].carved
+        return atlas.tiles(lambda rank: variants[rows[rank]].mask, number, stack.arrangement, carved_of)
 
     def covers(self, rows: Ints, boxes_xyxy: Ints, near_xyxy: Box | None) -> tuple[Ints, Cover]:
         """Rectangles that cover the masks of items (B,); see `bits.blockers.Covers.of`."""

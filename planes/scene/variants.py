@@ -36,7 +36,7 @@ from ..common.limits import (
 from ..grid import rasterize
 from ..grid.fixed_point import over_one, quarter_turns, rounded_div, turned
 from ..grid.rasterize import ellipse, quarter_turned
-from ..grid.spans import Spans
+from ..grid.spans import Box, Spans
 from .sprite import UIDS, Outline, Sprite, check_size, fits, frame_number, frame_pivot, frozen, local_grid, size_of
 
 Ints32 = npt.NDArray[np.int32]
@@ -103,15 +103,23 @@ def surely_fits(sprite: Sprite, transform: Transform) -> bool:
     return sprite.sides * max(transform.scale_x, transform.scale_y) <= SIDES_SURE * ONE
 
 
+Carved = tuple[tuple[int, Box], ...]
+"""The last masks of its size that a mask was carved out of, the last first: number, and box of the hole in it."""
+
+
 @dataclass(eq=False)  # a frozen one takes six times as long to make
 class Variant:
-    """The mask of a sprite in one pose, cropped and read-only, with its pivot in 1/256 px from the centre of [0, 0]."""
+    """The mask of a sprite in one pose, cropped and read-only, with its pivot in 1/256 px from the centre of [0, 0].
+
+    `carved` has the masks that it was carved out of.
+    """
 
     transform: Transform
     mask: Bools
     pivot_x: int
     pivot_y: int
     area: int
+    carved: Carved = ()
     uid: int = field(default_factory=UIDS.__next__, init=False)
 
 
