@@ -436,6 +436,25 @@ def test_only_the_tiles_that_holes_meet_are_packed(monkeypatch: pytest.MonkeyPat
         assert packed.pop(0) == expected and not packed
 
 
+def test_masks_are_laid_out_when_something_reads_them_one_by_one() -> None:
+    """Areas are fired at tiles. A stack of an earlier look, read for the first time now, tells the masks of then."""
+    scene = Scene()
+    hills = [scene.add(np.ones((90, 70 + i), np.bool_), (100 * i, 0)) for i in range(3)]
+    stacks, masks = [], []
+    for step in range(60):
+        scene.carve({hills[step % 3]: [(100 * (step % 3) + step // 6, step % 7)]})
+        assert fire(scene, Disc(2), (100 * (step % 3) + 20, 0), strategy="tiles")
+        assert scene.items.atlas.later, "nothing of this asks for pixels"
+        stacks.append(scene.items.stack())
+        masks.append([scene.mask(i)[0] for i in stacks[-1].ids.tolist()])
+        if step % 20 == 19:
+            assert fire(scene, Pistol(200), (50, 0), aim=0) == fire(made_anew(scene), Pistol(200), (50, 0), aim=0)
+            assert not scene.items.atlas.later
+    assert len({id(stack.atlas) for stack in stacks}) == 1
+    for stack, expected in zip(stacks[::-1], masks[::-1], strict=True):
+        assert all(np.array_equal(stack.mask(rank), mask) for rank, mask in enumerate(expected))
+
+
 def test_hits_must_be_of_the_scene_as_it_is() -> None:
     scene, _, tank = terrain()
     other = scene.copy()

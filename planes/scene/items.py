@@ -46,7 +46,7 @@ class Stack:
     owner: Ints  # (M,) ids
     box_xyxy: Ints  # (M, 4) inclusive, px
     offset: Ints  # (M,) start of the item's mask in `masks`, row by row
-    masks: Bools  # flat booleans of all masks in use
+    atlas: MaskAtlas
     layered: bool  # whether the items lie on more than one layer
     arrangement: int  # number of the arrangement: stacks of the same number differ only in boxes
 
@@ -76,6 +76,11 @@ class Stack:
     def nbytes(self) -> int:
         """Bytes of the columns, without the masks, which belong to the scene."""
         return STACK_ROW_BYTES * len(self.ids)
+
+    @property
+    def masks(self) -> Bools:
+        """Flat booleans of all masks in use."""
+        return self.atlas.flat
 
     @cached_property
     def _by_id(self) -> tuple[Ints, Ints]:
@@ -509,7 +514,7 @@ class Items:
         rows = last.rows
         return last.reformed(
             arrangement=self.arrangement, box_xyxy=self._boxes_in_order(rows), offset=self.offset.take(rows),
-            masks=self.atlas.flat, categories=self._filtered_by(rows, last.occluder), owner=self.owner.take(rows),
+            atlas=self.atlas, categories=self._filtered_by(rows, last.occluder), owner=self.owner.take(rows),
         )  # fmt: skip
 
     def _filtered_by(self, rows: Ints, occluder: Bools) -> Ints:
@@ -536,7 +541,7 @@ class Items:
         ids, rows, occluder = ids[order], rows[order], occluder[order]
         return Stack(
             ids, rows, occluder, self._filtered_by(rows, occluder), self.owner[rows], self.boxes(rows),
-            self.offset[rows], self.atlas.flat, layered, self.arrangement if roles == DECIDING else next(ARRANGEMENTS),
+            self.offset[rows], self.atlas, layered, self.arrangement if roles == DECIDING else next(ARRANGEMENTS),
         )  # fmt: skip
 
     def imagery(self) -> list[Role]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 import sys
+import threading
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import accumulate, product
@@ -152,15 +153,36 @@ def keep_variant(sprite: Sprite, variant: Variant) -> None:
     _kept.get((sprite.uid, variant.transform), lambda: variant)
 
 
+LAYING_OUT = threading.Lock()  # threads may read the past of a scene, which shares its atlas, while the scene changes
+
+
 @dataclass
 class MaskAtlas:
-    """All masks in use in one flat array; a mask that several items use is stored once."""
+    """All masks in use in one flat array; a mask that several items use is stored once.
 
-    flat: Bools = field(default_factory=lambda: np.zeros(1 << 12, np.bool_))
+    Masks are laid out when the array is read: areas are fired at tiles, and need none of it. Places are never reused.
+
+    Parameters
+    ----------
+    laid : the array, as it was laid out last
+    used, live : pixels of all masks, and of those that have a user
+    later : flat masks that are not laid out yet; they come after the others
+    """
+
+    laid: Bools = field(default_factory=lambda: np.zeros(1 << 12, np.bool_))
     used: int = 0
     live: int = 0
+    later: list[Bools] = field(default_factory=list)
     offsets: dict[int, int] = field(default_factory=dict)
     users: dict[int, int] = field(default_factory=dict)
+
+    @property
+    def flat(self) -> Bools:
+        """The array with all masks."""
+        if self.later:
+            with LAYING_OUT:
+                self._lay_out()
+        return self.laid
 
     def take(self, variants: Sequence[Variant]) -> list[int]:
         """Count one more user of each mask, store those that are new, and return their offsets."""
@@ -193,13 +215,20 @@ class MaskAtlas:
         """Store flat masks, by their numbers."""
         sizes = [mask.size for mask in masks.values()]
         ends = list(accumulate(sizes, initial=self.used))
-        if ends[-1] > len(self.flat):
-            grown = np.zeros(max(ends[-1], 2 * len(self.flat)), np.bool_)
-            grown[: self.used] = self.flat[: self.used]
-            self.flat = grown  # a stack that was handed out keeps the old array
-        np.concatenate(list(masks.values()), out=self.flat[self.used : ends[-1]])
         self.offsets.update(zip(masks, ends, strict=False))
-        self.used = ends[-1]
+        with LAYING_OUT:
+            self.later += masks.values()
+            self.used = ends[-1]
+
+    def _lay_out(self) -> None:
+        """Write the masks that came later."""
+        laid, begin = self.laid, self.used - sum(mask.size for mask in self.later)
+        if self.used > len(laid):
+            laid = np.zeros(max(self.used, 2 * len(laid)), np.bool_)
+            laid[:begin] = self.laid[:begin]
+        if self.later:  # another thread may have done it
+            np.concatenate(self.later, out=laid[begin : self.used])
+        self.laid, self.later = laid, []
 
 
 def picture_of(sprite: Sprite, transform: Transform, color: tuple[int, int, int]) -> tuple[Image, int, int]:
