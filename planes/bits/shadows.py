@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -330,7 +331,8 @@ def left_and_met(rects: Ints, item: Ints, x: Ints, y: Ints) -> Ints:
     rects : (B, m, 4) of each item, of which one holds pixel (0, 0)
     item : (s,) item of each pixel
     """
-    entry, leave = _spells(rects[item], x[:, None], y[:, None])
+    of_pixel = rects if len(rects) == 1 else rects[item]
+    entry, leave = _spells(of_pixel, x[:, None], y[:, None])
     inside = np.maximum(leave - entry, 0).sum(axis=1)
     return np.flatnonzero(inside < np.where(entry <= leave, leave, 0).max(axis=1))
 
@@ -523,27 +525,52 @@ def _exit_of(entry: Ints, leave: Ints) -> Ints:
 
 
 def sheltered_by(
-    blockers: Blockers, placement: Ints, blocker: Ints, of: Ints, xy: Ints, origin_xy: Ints, own: Ints
+    runs: Runs, origin_xy: Ints, blockers: Blockers, placement: Ints, blocker: Ints, wanted: Bools, own: Ints
 ) -> Ints:
     """Rank of the item that the way to each sample (s,) enters first, in front of others; -1 if it enters none.
 
     Parameters
     ----------
-    placement, blocker : (k,) sorted pairs whose blocker may shelter samples
-    of, xy : (s,) placement, rising, and (s, 2) pixel of each sample
-    origin_xy : (P, 2) pixels from which the ways of placements begin
+    runs, origin_xy, placement, blocker : see `shelter_of`
+    wanted : (s,) whether it is asked for a sample; for the others it is -1
     own : (s,) rank of an item that does not shelter the sample, or -1
     """
-    soonest, blocker_rank = np.full(len(of), NEVER), np.full(len(of), -1)
-    for p, b in zip(placement.tolist(), blocker.tolist(), strict=True):
-        rank = int(blockers.rank[b])
-        these = np.arange(*of.searchsorted((p, p + 1)))
-        these = these[own[these] != rank]
-        rects = blockers.rects_of(np.array([b]), origin_xy[p][None])[1]
-        x, y = (xy[these] - origin_xy[p]).T
-        begun = len(_begun(origin_xy[p][None], blockers, np.array([b]))[0]) > 0
-        hidden, entry = _times(rects[:, None], x, y, blockers.until_exit and begun)
-        time = np.where(hidden, entry, NEVER).min(axis=0, initial=NEVER)
-        sooner = time < soonest[these]
-        soonest[these[sooner]], blocker_rank[these[sooner]] = time[sooner], rank
+    soonest, blocker_rank = np.full(len(own), NEVER), np.full(len(own), -1)
+    begin = np.cumsum(runs.lengths) - runs.lengths - runs.x_first
+    begun = set(_begun(origin_xy[placement], blockers, blocker)[0].tolist())
+    for pair, run, first, last in _stretches_of(runs, origin_xy, blockers, placement, blocker):
+        which, column = each_pixel(first, last)
+        sample, origin = begin[run[which]] + column, origin_xy[placement[pair]]
+        rank = int(blockers.rank[blocker[pair]])
+        kept = (wanted[sample] & (own[sample] != rank)).nonzero()[0]
+        sample, x, y = sample[kept], column[kept] - origin[0], runs.y[run[which[kept]]] - origin[1]
+        time = np.zeros_like(x)
+        if pair not in begun or blockers.until_exit:
+            rects = blockers.rects_of(blocker[pair : pair + 1], origin[None])[1]
+            time = _entered(rects, x, y, pair in begun)
+        sooner = (time < soonest[sample]).nonzero()[0]
+        soonest[sample[sooner]], blocker_rank[sample[sooner]] = time[sooner], rank
     return blocker_rank
+
+
+def _stretches_of(
+    runs: Runs, origin_xy: Ints, blockers: Blockers, placement: Ints, blocker: Ints
+) -> Iterator[tuple[int, Ints, Ints, Ints]]:
+    """Stretches of runs that the blocker of each pair shelters, as (pair, run, x_first, x_last)."""
+    pair, run, first, last = _hidden(runs, origin_xy, blockers, placement, blocker)
+    which, first, last = merged_runs(pair * len(runs) + run, first, last)
+    pair, run = pair[which], run[which]
+    edges = np.append(begins(pair).nonzero()[0], len(pair)).tolist()
+    for begin, end in pairwise(edges):
+        yield int(pair[begin]), run[begin:end], first[begin:end], last[begin:end]
+
+
+def _entered(rects: Ints, x: Ints, y: Ints, begun: bool) -> Ints:
+    """When ways from pixel (0, 0) to pixels (s,) first enter a rectangle that shelters them, as in `_times`."""
+    parts = [np.zeros(0, np.int64)]
+    step = max(CHUNK_SAMPLES // len(rects), 1)
+    for first in range(0, len(x), step):
+        now = slice(first, first + step)
+        hidden, entry = _times(rects[:, None], x[now], y[now], begun)
+        parts.append(np.where(hidden, entry, NEVER).min(axis=0))
+    return np.concatenate(parts)

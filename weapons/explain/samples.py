@@ -286,13 +286,10 @@ def detail_of(context: QueryContext, weapon: Weapon, shots: Shots) -> Detail:
             ended[sample] = latest.rank[event]
     verdict, y = VERDICT_OF[state], runs.y[run]
     hidden = (state & SHELTERED != 0) & (verdict != Verdict.HIT)
-    if blockers is not None and hidden.any():
+    if blockers is not None and shelter is not None and hidden.any():
         own = _refused_first(events, start, len(x))
-        which = np.flatnonzero(hidden)
-        rank[which] = ended[which] = shelter_ranks(
-            runs, placements, shots, stack, blockers, runs.placement[run[which]],
-            np.stack([x, y], axis=1)[which], own[which],
-        )  # fmt: skip
+        ranks = shelter_ranks(runs, placements, shots, stack, blockers, shelter, own)
+        rank[hidden] = ended[hidden] = ranks[hidden]
     if bounds is not None:
         outside = (x < bounds[0]) | (y < bounds[1]) | (x > bounds[2]) | (y > bounds[3])
         verdict = np.where(outside, Verdict.OUTSIDE, verdict)

@@ -109,17 +109,21 @@ def sheltered_pixels(runs: Runs, placements: Placements, shots: Shots, stack: St
 
 
 def shelter_ranks(
-    runs: Runs, placements: Placements, shots: Shots, stack: Stack, blockers: Blockers, of: Ints, xy: Ints, own: Ints
+    runs: Runs, placements: Placements, shots: Shots, stack: Stack, blockers: Blockers, shelter: Shelter, own: Ints
 ) -> Ints:
     """Rank of the item that shelters each sample (s,): the first on the way, and in front of others there.
 
     Parameters
     ----------
-    runs : those of the samples
-    of, xy, own : (s,) placement, rising, (s, 2) pixel, and (s,) rank of an item that does not count, or -1
+    shelter : what shelters the samples of the runs; of a single item it is told at once
+    own : (s,) rank of an item that does not count, or -1
     """
-    placement, blocker = _near(runs, placements, shots, stack, blockers)
-    return late.shadows.sheltered_by(blockers, placement, blocker, of, xy, placements.xy, own)
+    several = shelter.items > 1
+    if not several.any():
+        return shelter.ranks
+    near = _near(runs, placements, shots, stack, blockers)
+    ranks = late.shadows.sheltered_by(runs, placements.xy, blockers, *near, several, own)
+    return np.where(several, ranks, shelter.ranks)
 
 
 def refuse_starts_inside(placements: Placements, shots: Shots, stack: Stack, blockers: Blockers) -> None:
