@@ -541,6 +541,8 @@ FIELDS: dict[str, tuple[Callable[[Any], object], str, tuple[Any, ...]]] = {
     "mask's id": (lambda v: world().mask(v), "item", (-1, 3, 0.5)),
     "name's id": (lambda v: world().name_of(v), "item", (-1, 3, 0.5)),
     "hits.of": (lambda v: shot().of(v), "shot", (-1, 1, 0.5)),
+    "hits.scene_of": (lambda v: shot().scene_of(v), "shot", (-1, 1, 0.5)),
+    "hits.scene_of of rays": (lambda v: shot(weapon=Pistol(9), aim=0).scene_of(v), "shot", (-1, 1, 0.5)),
     "hits.why_not": (lambda v: shot().why_not(v), "shot", (-1, 1, 0.5)),
     "hits.blockers": (lambda v: shot().blockers(v), "shot", (-1, 1, 0.5)),
     "hits.margins": (lambda v: shot().margins(v), "shot", (-1, 1, 0.5)),

@@ -343,7 +343,7 @@ class Hits:
 
     def object_pixels(self) -> dict[int, Spans]:
         """Pixels that all shots together hit of each object, as {object: pixels}; `Scene.carve` takes them away."""
-        self.scene_of(0)  # raises if the scene has changed, also if nothing was hit
+        self._scene_then(0)  # raises if the scene has changed, also if nothing was hit
         shots_of: dict[int, list[int]] = {}
         for shot in np.unique(self.shot).tolist():
             shots_of.setdefault(id(self.scene_of(shot)), []).append(shot)
@@ -411,9 +411,13 @@ class Hits:
 
     def scene_of(self, shot: int) -> Scene:
         """The scene that a shot was fired at; an InputError if the scene has changed since."""
+        return self._scene_then(self._checked(shot))
+
+    def _scene_then(self, row: int) -> Scene:
+        """The scene of a checked shot; row 0 also serves a call without shots, which has one scene."""
         scene, version = self.scene, self.version
         if self._scenes is not None:
-            scene = self._scenes[self._checked(shot)]  # of the past, which does not change unless it is a copy
+            scene = self._scenes[row]  # of the past, which does not change unless it is a copy
             version = self._versions.get(id(scene), scene.version)
         if scene.version != version:
             raise InputError(f"hits: expected the scene at version {version}, got version {scene.version}: {BEFORE}")

@@ -430,7 +430,7 @@ class RayHits(Hits):
         missed, or misses one that it hit. Whatever ends a shifted ray counts. A margin of at most 1 px is fragile.
         """
         if self._scenes is None:
-            self.scene_of(0)  # raises for an answer of an older scene, even an empty one
+            self._scene_then(0)  # raises for an answer of an older scene, even an empty one
         found: list[Margin] = []
         for row in range(len(self.shots)) if shot is None else [self._checked(shot)]:
             found += late.margins.ray_margins(self.scene_of(row), self._parts, self._one(row), row)
