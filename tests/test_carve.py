@@ -475,6 +475,11 @@ def test_hits_must_be_of_the_scene_as_it_is() -> None:
         ({9: [[1, 1]]}, "id of pixels: expected a whole number from 0 to 1, got 9"),
         ({0: [[30, 25]], 1: [[1, 2, 3]]}, r"pixels\[1\]: expected shape \(any, 2\), got \(1, 3\)"),
         ({0: [[30, 25]], 1: [[1.5, 2]]}, r"pixels\[1\]\[0\]\[0\]: expected a whole number"),
+        ({0: Spans([25], [30], [0.5])}, r"pixels\[0\]: x_last\[0\]: expected a whole number .*, got 0.5"),
+        ({0: Spans(np.array([25.5]), np.array([3]), np.array([4]))}, r"pixels\[0\]: y\[0\]: expected a whole .*25.5"),
+        ({0: Spans([25, 26], [3], [4])}, r"pixels\[0\]: x_first: expected shape \(2,\), got \(1,\)"),
+        ({0: Spans([25], ["a"], [4])}, r"pixels\[0\]: x_first: expected numbers, got \['a'\]"),
+        ({0: Spans(np.array([25]), np.array([-(2**63)]), np.array([40]))}, r"pixels\[0\]: x_first\[0\]: expected"),
         ({"hill": [[1, 1]]}, "id of pixels: expected a whole number from 0 to 1, got 'hill'"),
     ],
 )
@@ -484,6 +489,16 @@ def test_bad_pixels_change_nothing(pixels: Any, told: str) -> None:
     with pytest.raises(InputError, match=told):
         scene.carve(pixels)
     assert (scene.version, scene.content_hash()) == (version, content)
+
+
+def test_runs_made_by_hand_are_carved() -> None:
+    """As lists, out of order and overlapping."""
+    runs = [(26, 20, 23), (25, 18, 30), (25, 28, 33), (26, 2, -5)]
+    by_hand, made = (terrain()[0] for _ in range(2))
+    y, x_first, x_last = map(list, zip(*runs, strict=True))
+    lost = by_hand.carve({0: Spans(y, x_first, x_last)})  # type: ignore[arg-type]
+    assert lost == made.carve({0: Spans.from_runs(y, x_first, x_last)}) == {0: 20}  # type: ignore[arg-type]
+    assert by_hand.content_hash() == made.content_hash()
 
 
 def test_a_sprite_too_large_to_be_cut_is_refused() -> None:

@@ -2,6 +2,7 @@
 
 import itertools
 import random
+from typing import Any
 
 import numpy as np
 import oracle_raster as oracle
@@ -10,7 +11,9 @@ from examples import examples
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hitplanes import InputError
 from hitplanes.planes.grid.spans import Spans, begins
+from hitplanes.planes.volumes import fit
 
 LAWS = examples(200, deadline=None)
 
@@ -73,6 +76,27 @@ def test_order_and_repeats_do_not_matter(runs: Runs, rng: random.Random) -> None
 @given(any_runs)
 def test_single_pixels_make_the_same_spans(runs: Runs) -> None:
     assert make([(y, x, x) for x, y in runs_of(runs)]) == make(runs)
+
+
+@pytest.mark.parametrize(
+    ("runs", "told"),
+    [
+        (([0], [1.5], [3]), r"^x_first\[0\]: expected a whole number .*, got 1.5"),
+        ((np.zeros(2), np.zeros(3), np.zeros(3)), r"^x_first: expected shape \(2,\), got \(3,\)"),
+        ((np.zeros(2, int), np.zeros(3, int), np.zeros(2, int)), r"^x_first: expected shape \(2,\), got \(3,\)"),
+        ((["a"], [1], [3]), r"^y: expected numbers, got \['a'\]"),
+        ((0, 1, 3), r"^y: expected shape \(any,\), got \(\)"),
+        ((np.array([[0]]), np.array([[0]]), np.array([[0]])), r"^y: expected shape \(any,\), got \(1, 1\)"),
+        (([0], [True], [3]), r"^x_first: expected numbers, got \[True\]"),
+        (([2**50], [0], [3]), r"^y\[0\]: expected a whole number"),
+    ],
+)
+def test_runs_are_of_whole_pixels(runs: Any, told: str) -> None:
+    with pytest.raises(InputError, match=told):
+        Spans.from_runs(*runs)
+    with pytest.raises(InputError, match=told.replace("^", "^pixels: ")):
+        fit.box(Spans(*runs))
+    assert Spans.from_runs([4, 3], (7.0, 1), [9, 2]).runs().tolist() == [[3, 1, 2], [4, 7, 9]]  # type: ignore[arg-type]
 
 
 def test_from_runs_leaves_its_input_alone() -> None:

@@ -122,6 +122,14 @@ def merged_runs(row: Ints, x_first: Ints, x_last: Ints) -> tuple[Ints, Ints, Int
     return order[begins], x_first[begins], (reach - shift)[ends]
 
 
+def checked_runs(y: object, x_first: object, x_last: object) -> tuple[Ints, Ints, Ints]:
+    """Check columns (n,) of runs that a caller made, whole px."""
+    rows = integers("y", y, (None,), -POSITION_MAX, POSITION_MAX)
+    ends = (("x_first", x_first), ("x_last", x_last))
+    first, last = (integers(name, column, rows.shape, -POSITION_MAX, POSITION_MAX) for name, column in ends)
+    return rows, first, last
+
+
 def area(boxes_xyxy: Ints) -> int:
     """Sum of the pixels of inclusive boxes."""
     sides = boxes_xyxy[:, 2:] - boxes_xyxy[:, :2] + 1
@@ -144,9 +152,11 @@ class Spans:
     @classmethod
     def from_runs(cls, y: Ints, x_first: Ints, x_last: Ints) -> Spans:
         """Union of any runs: unsorted, overlapping, or empty (x_first > x_last)."""
-        row = np.asarray(y, np.int64)
-        which, first, last = merged_runs(row, np.asarray(x_first, np.int64), np.asarray(x_last, np.int64))
-        return cls(row[which], first, last)
+        columns = y, x_first, x_last
+        if not all(type(c) is np.ndarray and c.dtype == np.int64 and c.shape == (y.size,) for c in columns):
+            y, x_first, x_last = checked_runs(*columns)
+        which, first, last = merged_runs(y, x_first, x_last)
+        return cls(y[which], first, last)
 
     @classmethod
     def empty(cls) -> Spans:

@@ -18,7 +18,7 @@ import numpy as np
 from ..common.checks import Bools, InputError, Ints, integers, shown, within
 from ..common.limits import HALF, MASK_AREA_MAX, POSITION_MAX, SUB
 from ..grid.fixed_point import over_one, rounded_div, turned
-from ..grid.spans import Box, Spans
+from ..grid.spans import Box, Spans, checked_runs
 from .sprite import Carving, Sprite, fits, local_grid
 from .variants import ONE, Transform, Variant, cropped, keep_variant
 
@@ -88,7 +88,8 @@ def hole_of(field: str, pixels: object, mask: Bools, corner_xy: tuple[int, int])
     The mask has its pixel [0, 0] at a corner (x, y); `field` is for errors.
     """
     if isinstance(pixels, Spans):
-        x, x_last, y = pixels.x_first, pixels.x_last, pixels.y
+        with within(field):
+            y, x, x_last = checked_runs(pixels.y, pixels.x_first, pixels.x_last)
     else:
         x, y = integers(field, pixels, (None, 2), -POSITION_MAX, POSITION_MAX).T
         x_last = x

@@ -22,7 +22,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..common.backend import LruCache
-from ..common.checks import Bools, Floats, InputError, Ints, array_of, bools, boxes_in, choice, integer, real, reals
+from ..common.checks import (
+    Bools,
+    Floats,
+    InputError,
+    Ints,
+    array_of,
+    bools,
+    boxes_in,
+    choice,
+    integer,
+    real,
+    reals,
+    within,
+)
 from ..common.limits import (
     BOUNDING_BYTES,
     BOUNDING_CACHE_BYTES,
@@ -200,6 +213,8 @@ def _checked(mask: object, field: str = "mask", expected: str = "a mask (h, w)")
 def _extents(pixels: object) -> Extents:
     if not isinstance(pixels, Spans):
         return extents(_checked(pixels, "pixels", "a mask (h, w) or Spans"))
+    with within("pixels"):
+        pixels = Spans.from_runs(pixels.y, pixels.x_first, pixels.x_last)  # a caller may have made them by hand
     if not len(pixels):
         raise InputError("pixels: expected a pixel or more, got none")
     begins = np.flatnonzero(np.diff(pixels.y, prepend=pixels.y[0] - 1))
