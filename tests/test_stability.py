@@ -293,6 +293,27 @@ def test_an_interrupt_keeps_what_was_asked(
     assert "not complete" in (folder / "stability.md").read_text() and (folder / "stability.png").exists()
 
 
+@pytest.mark.parametrize("complete", [True, False])
+def test_an_interrupt_of_the_picture_says_that_it_is_missing(
+    complete: bool, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with_predicates(monkeypatch, named("circles"))
+
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(stability, "heat_figure", interrupted)
+    if not complete:
+        ask = stability._ask
+        monkeypatch.setattr(stability, "_ask", lambda *given: interrupted(ask(*given)))
+        monkeypatch.setattr(Study, "complete", False)
+    folder = tmp_path / "out"
+    assert main(["stability", "--quick", "-o", str(folder)]) == 130
+    missing = "only the picture is missing" if complete else "it is not complete, and the picture is missing"
+    assert capsys.readouterr().err == f"hitplanes: interrupted: what was asked is in {folder}; {missing}\n"
+    assert sorted(path.name for path in folder.iterdir()) == ["stability.json", "stability.md"]
+
+
 def test_a_run_is_kept_cell_by_cell(few: None, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Whatever ends it; before the first cell is done the folder is that of the run before."""
 

@@ -482,13 +482,15 @@ def test_kinds_that_no_shot_is_near_are_told_nothing_of(planes_alone: None) -> N
     assert len(study["kinds"]) == 2 and len(by_kind) == 1
 
 
-def test_a_second_interrupt_leaves_the_tables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_second_interrupt_leaves_the_tables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr("hitplanes.weapons.lab.study.study.work_precision", interrupted)
     monkeypatch.setattr("hitplanes.weapons.lab.study.study.run_study", kept_of_another)
     assert main(["study", "-o", str(tmp_path / "study"), "--quick"]) == 130
+    told = f"hitplanes: interrupted: what was measured is in {tmp_path / 'study'}; only diagrams are missing\n"
+    assert capsys.readouterr().err == told
     assert sorted(path.name for path in (tmp_path / "study").iterdir()) == ["study.csv", "study.json", "study.md"]
     assert ".png" not in (tmp_path / "study" / "study.md").read_text()
 

@@ -328,8 +328,13 @@ def _write(study: Study, folder: Path) -> None:
     """Write the JSON, the tables and, if matplotlib is installed, the picture."""
     _keep(study, folder)
     write_text(folder / FILES[1], markdown(study))
-    if find_spec("matplotlib") is not None:
+    if find_spec("matplotlib") is None:
+        return
+    try:
         save_figure(heat_figure(study), folder / FILES[2])
+    except KeyboardInterrupt:
+        missing = "only the picture is missing" if study.complete else "it is not complete, and the picture is missing"
+        raise KeyboardInterrupt(f"what was asked is in {folder}; {missing}") from None
 
 
 def markdown(study: Study) -> str:

@@ -409,7 +409,10 @@ def _write_tables(study: Mapping[str, Any], folder: Path, error: float) -> list[
     if find_spec("matplotlib") is None:
         return drawn
     for question in filter(places, study["questions"]):
-        save_figure(work_precision(question, study["scene"]["name"]), folder / f"{question['name']}.png")
+        try:
+            save_figure(work_precision(question, study["scene"]["name"]), folder / f"{question['name']}.png")
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt(f"what was measured is in {folder}; only diagrams are missing") from None
         drawn.append(question["name"])
         write_text(folder / FILES[2], markdown(study, error, drawn))
     return drawn
