@@ -135,6 +135,15 @@ def test_answers_of_prepared_weapons_become_plain_hits(name: str, way: str) -> N
     assert struck
 
 
+@pytest.mark.parametrize("weapon", [Disc(3), Pistol(70), Sweep(Laser(50), 90, 7)], ids=lambda weapon: weapon.kind)
+@pytest.mark.parametrize("way", [pickle.dumps, copy.copy, copy.deepcopy], ids=lambda way: way.__name__)
+def test_a_prepared_weapon_says_what_to_pickle_instead(weapon: Any, way: Callable[[Any], object]) -> None:
+    ready = prepare(Scene((50, 50)), weapon)
+    told = "^ready: a prepared weapon cannot be pickled or copied: pickle or copy its scene and its weapon instead, and"
+    with pytest.raises(InputError, match=told):
+        way(ready)
+
+
 @pytest.mark.parametrize("way", ["copy.deepcopy", "pickle"])
 @pytest.mark.parametrize("name", ["disc", "pistol"])
 def test_a_copy_belongs_to_the_copy_of_its_scene(name: str, way: str) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import threading
 from math import floor
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, Generic, TypeVar, Unpack, cast, overload
+from typing import TYPE_CHECKING, Any, Generic, NoReturn, TypeVar, Unpack, cast, overload
 
 import numpy as np
 
@@ -83,6 +83,10 @@ class Ready(Generic[AnyHits]):
         self._filter = kept
         self._items, self._version, self._lock = scene.items, -1, threading.Lock()
         self._filtered: LruCache[tuple[object, ...], Ready[AnyHits]] = LruCache(FILTERS_MOST, lambda _: 1)
+
+    def __reduce__(self) -> NoReturn:
+        how = "pickle or copy its scene and its weapon instead, and prepare the weapon again"
+        raise InputError(f"ready: a prepared weapon cannot be pickled or copied: {how}")
 
     def _with(self, kept: Filter) -> Ready[AnyHits]:
         return Ready(self.scene, self.weapon, kept)
