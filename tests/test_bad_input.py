@@ -268,6 +268,9 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
         lambda: Scene.from_planes(hittable=[[0, -1]]), r"hittable\[0\]\[1\]: expected a whole .*got -1"),
     "labels, broken": (lambda: Scene.from_planes(movers=[[0, 1.5]]), r"movers\[0\]\[1\]: expected a whole .*got 1.5"),
     "labels, NaN": (lambda: Scene.from_planes(movers=[[0, math.nan]]), r"movers\[0\]\[1\]: expected a whole .*got nan"),
+    "labels of floats": (
+        lambda: Scene.from_planes(hittable=np.eye(3)),
+        "^hittable: expected booleans or whole numbers, got float64: array > 0 makes a mask of it, and array.astype"),
     "labels, too large": (
         lambda: Scene.from_planes(hittable=[[2**31]]), r"hittable\[0\]\[0\]: expected a whole number"),
     "labels with true": (lambda: Scene.from_planes(hittable=[[True, 2]]), r"hittable\[0\]\[0\]: .*got True"),
@@ -424,6 +427,10 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
     "load, 300 characters": (lambda: load_scene("x" * 300), "scene.json: cannot read it: File name too long"),
     "save, None": (lambda: world().save(None), "folder: expected a path, got None"),  # type: ignore[arg-type]
     "save below a file": (lambda: world().save(GALLERY / "duck.png" / "x"), "folder: cannot make .*: Not a directory"),
+    "PNG of another ending": (
+        lambda: write_png("x.jpg", FRAME), "^output: expected a name that ends in .png, got 'x.jpg'"),
+    "PNG without an ending": (
+        lambda: write_png("no/such/png", FRAME), "^output: expected a name that ends in .png, got 'png'"),
     "PNG, None": (lambda: read_png(None), "image: expected a path, got None"),  # type: ignore[arg-type]
     "PNG, its bytes": (lambda: read_png(b"\x89PNG"), "image: expected a path, got b"),  # type: ignore[arg-type]
     "PNG, missing": (lambda: read_png("no.png"), "image: expected a PNG file, got 'no.png': No such file or directory"),
@@ -649,8 +656,9 @@ def test_numbers_in_any_form_are_taken_and_left_as_they_were(form: str) -> None:
     moved.set([0, 1], position_xy=given[:2] if isinstance(given, tuple | list | np.ndarray) else at[:2])  # type: ignore[index]
     told.move([0, 1], at[:2])
     assert moved.content_hash() == told.content_hash()
-    labels = Scene.from_planes(hittable=given)
-    assert labels.content_hash() == Scene.from_planes(hittable=at).content_hash()
+    if np.asarray(given).dtype.kind != "f":
+        labels = Scene.from_planes(hittable=given)
+        assert labels.content_hash() == Scene.from_planes(hittable=at).content_hash()
     assert np.array_equal(np.asarray(given), at)
 
 
@@ -703,6 +711,7 @@ TAKES_A_PATH: dict[str, Callable[[Any], object]] = {
     "run_stability": lambda path: run_stability(path, 0, True, io.StringIO()),
 }
 NO_PATHS = [
+    "",
     "a\0b",
     Path("a\0b"),
     "\ud800",

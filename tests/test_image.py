@@ -207,7 +207,7 @@ def test_a_bad_file_is_an_error(tmp_path: Path, data: bytes, message: str) -> No
 
 @pytest.mark.parametrize("name", ["missing.png", "folder", "file.txt/a.png"])
 def test_a_file_that_cannot_be_read_is_an_error(tmp_path: Path, name: str) -> None:
-    (tmp_path / "folder").mkdir()
+    (tmp_path / "folder.png").mkdir()
     (tmp_path / "file.txt").write_text("text")
     with pytest.raises(InputError, match="image: expected a PNG file"):
         read_png(tmp_path / name)
@@ -270,13 +270,13 @@ def test_a_write_that_fails_leaves_the_old_file_and_no_part(
 
 
 @pytest.mark.parametrize("write", WRITERS, ids=["png", "text"])
-@pytest.mark.parametrize("name", ["missing/a.png", "file.txt/a.png", "folder", "n" * 250])
+@pytest.mark.parametrize("name", ["missing/a.png", "file.txt/a.png", "folder.png", "n" * 246 + ".png"])
 def test_a_place_that_cannot_be_written_is_an_error(tmp_path: Path, write: Callable[[Path], None], name: str) -> None:
     (tmp_path / "file.txt").write_text("text")
-    (tmp_path / "folder").mkdir()
+    (tmp_path / "folder.png").mkdir()
     with pytest.raises(InputError, match="output: cannot write"):
         write(tmp_path / name)
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["file.txt", "folder"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["file.txt", "folder.png"]
 
 
 @pytest.mark.parametrize(

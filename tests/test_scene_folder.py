@@ -682,6 +682,7 @@ BAD_OBJECTS: dict[str, tuple[dict[str, Any], str]] = {
     "frames key": ({**IMAGE, "frames": {"grid": [3, 2]}}, "key: .*got 'grid' .did you mean 'grid_wh'"),
     "frames grid": ({**IMAGE, "frames": {"grid_wh": [4, 2]}}, "grid_wh: expected to divide the image of 6 x 4"),
     "frames rects": ({**IMAGE, "frames": {"rects_xywh": [[0, 0, 7, 1]]}}, r"rects_xywh\[0\]: expected to lie in"),
+    "frames neither": ({**IMAGE, "frames": {}}, "frames: expected grid_wh or rects_xywh, got neither"),
     "frames both": ({**IMAGE, "frames": {"grid_wh": [3, 2], "rects_xywh": [[0, 0, 1, 1]]}}, "frames: .*got both"),
     "frame of sheet": ({**IMAGE, "frames": {"grid_wh": [3, 2]}, "frame": 4}, "frame: .*from 0 to 3, got 4"),
     "threshold": ({**IMAGE, "alpha_threshold": 300}, "alpha_threshold: .*from 0 to 255, got 300"),

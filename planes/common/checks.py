@@ -196,7 +196,7 @@ def suggestion(value: object, names: Iterable[str]) -> str:
 
 def path_of(field: str, value: object) -> Path:
     """Check a path, given as a text or a `pathlib` path; it need not exist."""
-    if not isinstance(value, str | PurePath):
+    if not (isinstance(value, str | PurePath) and value):  # Path("") would be the current folder
         raise InputError(f"{field}: expected a path, got {shown(value)}")
     text = str(value)
     try:

@@ -121,9 +121,11 @@ def write_png(path: str | Path, image: Image) -> None:
     Raises
     ------
     InputError
-        If the array is not an image, or the file cannot be written.
+        If the name does not end in .png, the array is not an image, or the file cannot be written.
     """
     path = path_of("output", path)
+    if not path.name.lower().endswith(".png"):  # also ".png", which has no suffix
+        raise InputError(f"output: expected a name that ends in .png, got {path.name!r}")
     is_array = isinstance(image, np.ndarray)
     if not (is_array and image.dtype == np.uint8 and image.size and image.shape[2:] in ((3,), (4,))):
         got = f"{image.dtype} {image.shape}" if is_array else shown(image)

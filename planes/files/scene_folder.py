@@ -248,6 +248,8 @@ def _object(entry: object, folder: Path, sprites: dict[str, Sprite]) -> dict[str
 
 def _image_sprite(data: dict[str, Any], folder: Path, source: dict[str, Any]) -> Sprite:
     image, frames = read_png(_inside(folder, data.pop("image"))), data.pop("frames", {})
+    if "frames" in source and not frames:
+        raise InputError("frames: expected grid_wh or rects_xywh, got neither")
     return Sprite.from_image(image, **data, **frames, source=source)
 
 
