@@ -223,7 +223,12 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
         lambda: world().add(Sprite.circle(1), owner=9), "owner: expected a whole number from 0 to 3, got 9"),
     "name, too long": (lambda: world().add(Sprite.circle(1), name="x" * 201), "name: expected a text of 1 to 200"),
     # change, remove, ask
-    "ids, negative": (lambda: world().move(-1, (0, 0)), r"ids\[0\]: expected a whole number from 0 to 2, got -1"),
+    "ids, None": (lambda: world().position(None), "^ids: expected a number, got None$"),  # type: ignore[arg-type]
+    "ids, true": (lambda: world().remove(True), "^ids: expected a number, got True$"),
+    "scale, a text": (lambda: world().add(Sprite.circle(1), scale="x"), "^scale: expected a number, got 'x'$"),
+    "scale of a set, a text": (lambda: world().set(0, scale="x"), "^scale: expected a number, got 'x'$"),
+    "layer of a set, true": (lambda: world().set(0, layer=True), "^layer: expected a number, got True$"),
+    "ids, negative": (lambda: world().move(-1, (0, 0)), r"ids: expected a whole number from 0 to 2, got -1"),
     "ids, removed": (lambda: world().remove([0, 2]), r"ids\[1\]: expected an object in the scene, got 2, which was re"),
     "ids, twice": (lambda: world().remove([0, 1, 0]), r"ids\[2\]: expected each object once, got 0 again"),
     "ids, booleans": (lambda: world().remove([True, False]), r"ids: expected numbers, got \[True, False\]"),
@@ -386,11 +391,28 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
         lambda: shot(at=[(1, 2), (3, 4)], toward=masked), r"toward\[1\]\[1\]: expected a value, got a mas"),
     "accept, negative": (lambda: shot(accept=-1), "accept.*: expected a whole number from 0 .*got -1"),
     "accept, None": (lambda: shot(accept=None), "accept: expected category names or bits, or ALL, got None"),
+    "accept, a dict": (
+        lambda: shot(accept={"a": 1}), r"^accept: expected category names or bits, or ALL, got \{'a': 1\}$"),
+    "blocked_by, a set": (
+        lambda: shot(blocked_by={"a"}), r"^blocked_by: expected category names or bits, or ALL, got \{'a'\}$"),
+    "accept, names and a number": (
+        lambda: shot(accept=["friend", 5]),
+        r"^accept: expected category names or bits, or ALL, or a list of names for each shot, got \['friend', 5\]$"),
+    "accept, a list of names and a number": (
+        lambda: shot(accept=[["friend"], 5]),
+        r"^accept: expected .*, or a list of names for each shot, got \[\['friend'\], 5\]$"),
+    "accept, true": (lambda: shot(accept=True), "^accept: expected a number, got True$"),
+    "aim, a text": (lambda: shot(aim="x"), "^aim: expected a number, got 'x'$"),
+    "shot number, true": (lambda: shot(shot=True), "^shot: expected a number, got True$"),
+    "tick, a text": (
+        lambda: fire(past(), Disc(3), (1, 1), tick="x"), "^tick: expected a number, got 'x'$"),  # type: ignore[arg-type]
     "accept, a name": (lambda: shot(accept="taget"), "accept: .*got 'taget' .did you mean 'target'"),
     "accept, unknown name": (lambda: shot(accept=["taget"]), "accept: .*got 'taget' .did you mean 'target'"),
-    "exclude, -2": (lambda: shot(exclude=[0, -2]), r"exclude\[0\]\[1\]: expected a whole number from -1 .*got -2"),
+    "exclude, -2": (lambda: shot(exclude=[0, -2]), r"exclude\[1\]: expected a whole number from -1 .*got -2"),
     "exclude, a name": (lambda: shot(exclude=["duck"]), r"exclude: expected ids, got \['duck'\]: scene.find"),
-    "exclude, true": (lambda: shot(exclude=True), r"exclude: expected numbers, got .*True"),
+    "exclude, true": (lambda: shot(exclude=True), "^exclude: expected a number, got True$"),
+    "exclude, -2 alone": (lambda: shot(exclude=-2), "^exclude: expected a whole number from -1 to .*got -2$"),
+    "exclude, a set": (lambda: shot(exclude={1}), r"^exclude: expected a number, got \{1\}$"),
     "exclude, three dimensions": (lambda: shot(exclude=np.zeros((1, 1, 1))), r"exclude: expected shape \(1, any\)"),
     "seed, text": (lambda: shot(seed="7"), "seed: expected a whole number .*got '7'"),
     "seed, 5000 digits": (lambda: shot(seed=DIGITS), "seed: expected .*got a int that is too long to show"),

@@ -71,7 +71,14 @@ def array_of(
 
 
 def each(field: str, value: object, n: int) -> npt.NDArray[Any]:
-    """Repeat a single value n times; an array is returned as it is, for the next check."""
+    """Repeat a single number n times; an array is returned as it is, for the next check."""
+    if array_of(field, value).ndim == 0:
+        _numeric(field, value, (), "iuf")  # the next check would quote it as a list
+    return repeated(field, value, n)
+
+
+def repeated(field: str, value: object, n: int) -> npt.NDArray[Any]:
+    """Repeat a single number or word n times; an array is returned as it is, for the next check."""
     array = array_of(field, value)
     return np.broadcast_to(array, (n,)) if array.ndim == 0 else array
 

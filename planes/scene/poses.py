@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..common.checks import Floats, InputError, array_of, choice, each, integers, reals, within
+from ..common.checks import Floats, InputError, array_of, choice, each, integers, reals, repeated, within
 from ..common.limits import POSITION_MAX, SUB
 from ..grid.fixed_point import all_quarter_turns, snap
 from .sprite import Sprite, as_sprite, frame_number
@@ -59,8 +59,10 @@ def scale_pair(scale: object) -> tuple[float, float]:
     """Check a scale, one number or (sx, sy), and return the pair."""
     if type(scale) is float:
         return scale, scale  # `whole_scale` checks it
-    values = array_of("scale", scale)
-    sx, sy = reals("scale", values if values.ndim else np.stack([values, values]), (2,)).tolist()
+    if array_of("scale", scale).ndim == 0:
+        one = float(reals("scale", scale, ()))
+        return one, one
+    sx, sy = reals("scale", scale, (2,)).tolist()
     return sx, sy
 
 
@@ -107,7 +109,7 @@ def _sprite_rows(sprite: object, n: int) -> list[Sprite]:
 
 def _frame_rows(frame: object, sprites: list[Sprite]) -> list[int]:
     """Check frames of objects, one for all or (n,), as numbers or as names in their sprites."""
-    given = each("frame", frame, len(sprites))
+    given = repeated("frame", frame, len(sprites))
     if given.dtype.kind == "U" and given.shape != (len(sprites),):
         raise InputError(f"frame: expected one for all or {len(sprites)}, got {given.size}")
     numbers: list[Any] = given.tolist()
@@ -122,7 +124,7 @@ def _frame_rows(frame: object, sprites: list[Sprite]) -> list[int]:
 
 def _flip_rows(flip: object, n: int) -> list[str]:
     """Check flips, one word for all or (n,)."""
-    words: list[str] = each("flip", flip, n).tolist()
+    words: list[str] = repeated("flip", flip, n).tolist()
     if len(words) != n:
         raise InputError(f"flip: expected one for all or {n}, got {len(words)}")
     for row, word in enumerate(words):

@@ -495,7 +495,8 @@ class Scene:
         table = self._items.table
         if isinstance(ids, int | np.integer) and type(ids) is not bool and ids in self:
             return np.array([table.row(int(ids))])
-        given = integers("ids", np.atleast_1d(ids_of("ids", ids)), (None,), 0, table.count - 1)
+        values = ids_of("ids", ids)
+        given = np.atleast_1d(integers("ids", values, (None,) if values.ndim else (), 0, table.count - 1))
         rows = table.rows(given)
         gone = np.flatnonzero(rows < 0)
         if len(gone):

@@ -5,7 +5,7 @@ scene, weapon, at -> checked shots -> `areas` or `rays.ray_call` -> hits
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence, Set
 from copy import copy
 from typing import TYPE_CHECKING, Any, SupportsFloat, SupportsIndex, TypedDict, Unpack, overload
 
@@ -333,15 +333,20 @@ def _request_of(scene: Scene, weapon: Weapon, shots: Shots, how: How, plan: Plan
 
 def category_bits(scene: Scene, field: str, value: object) -> object:
     """Category bits of a name or a list of names, or of a list for each shot; any other value unchanged."""
-    if value is None:
-        raise InputError(f"{field}: expected category names or bits, or ALL, got None")
+    if type(value) is int:
+        return value
     names = (value,) if isinstance(value, str) else value
+    expected = "category names or bits, or ALL"
+    if value is None or isinstance(value, Mapping | Set):
+        raise InputError(f"{field}: expected {expected}, got {shown(value)}")
     if not isinstance(names, list | tuple):
         return value
     if all(isinstance(name, str) for name in names):
         return scene.category_bits(*names, field=field)
     if all(isinstance(own, list | tuple) and all(isinstance(name, str) for name in own) for own in names):
         return np.array([scene.category_bits(*own, field=f"{field}[{row}]") for row, own in enumerate(names)])
+    if any(isinstance(own, str | list | tuple) for own in names):
+        raise InputError(f"{field}: expected {expected}, or a list of names for each shot, got {shown(value)}")
     return value
 
 

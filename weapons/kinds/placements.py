@@ -501,16 +501,17 @@ def checked_owners(exclude: object, n: int, single: bool) -> Ints | tuple[int, .
         return (exclude,)
     if single and isinstance(exclude, tuple | list) and all(type(v) is int and -1 <= v <= OWNER_MAX for v in exclude):
         return tuple(exclude)
-    array = given = ids_of("exclude", exclude)
-    if array.ndim == 0:
-        array = np.broadcast_to(array, (n, 1))
-    elif array.ndim == 1:
-        array = array[None] if single else array[:, None]
-    if array.ndim == 2 and len(array) == 1:
-        array = np.broadcast_to(array, (n, array.shape[1]))
-    if len(array) != n:
+    given = ids_of("exclude", exclude)
+    owners = integers("exclude", given, (None,) * given.ndim, -1, OWNER_MAX)
+    if owners.ndim < 2:
+        owners = owners.reshape((1, -1) if single or not owners.ndim else (-1, 1))
+    if owners.ndim == 2 and len(owners) == 1:
+        owners = owners.repeat(n, axis=0)
+    if len(owners) != n:
         raise InputError(
             f"exclude: expected an owner for each of {n} shots, or one list for all of them, as [[1, 2]], "
             f"got shape {given.shape}"
         )
-    return integers("exclude", array, (n, None), -1, OWNER_MAX)
+    if owners.ndim > 2:
+        raise InputError(f"exclude: expected shape ({n}, any), got {given.shape}")
+    return owners
