@@ -253,6 +253,9 @@ class Sprite:
     ) -> Sprite:
         """Closed rectangle of `width` x `height` px centred on the position.
 
+        `Sprite.box(2, 2)` covers 9 px, where the weapon `Box(2, 2)` covers 4: a shape has every pixel whose centre lies
+        in it or on its sides, here those at -1, 0 and 1 along each axis; the weapon counts its pixels.
+
         `color` is the RGB in which pictures fill it; `angle_step` as for a polygon.
         """
         w, h = (real(name, v, 0, MASK_SIDE_MAX) / 2 for name, v in (("width", width), ("height", height)))

@@ -59,7 +59,8 @@ class Ready(Generic[AnyHits]):
 
     - the pattern of each aim, and of each shot number of a `Spread`, as bits;
     - the visible set, which `fire` uses, too, once it has paid for itself; before, shots walk the tiles of the items;
-    - the visible tiles near each square of 32 px of shot positions (see `position_cache`).
+    - for each square of 32 x 32 px, the tiles of the visible set that shots in the square may reach (see
+      `position_cache`).
 
     With compiled kernels there are no squares: one call of a kernel looks up the cells of the visible set (see
     `compiled`).

@@ -275,7 +275,11 @@ Versions: {", ".join(f"{name} {number}" for name, number in study["versions"].it
 Pixels, supercover, swept, every pixel and pellets are what `fire` does; volumes are tested by `overlap`.
 """
     if table := ranks(study, error):
-        yield f"As the books rank them, but measured; good enough means {error:g} wrong decisions a shot or less:\n"
+        yield f"""\
+Textbooks rank three volumes: the simpler one is faster, the tighter one more accurate. The table has their ranks as
+measured here: 1 is the fastest, or the most accurate. The last column names the kinds of shapes for which the volume
+makes {error:g} wrong decisions a shot or fewer.
+"""
         yield from markdown_table(["", "fast", "accurate", "good enough for"], table)
     for question in study["questions"]:
         yield from _question(question, question["name"] in pictures)
