@@ -31,6 +31,7 @@ from hitplanes import (
 from hitplanes.planes.scene.render import blend, draw_view
 from hitplanes.weapons.replay.shot_log import fire_request, requests_of
 from hitplanes.weapons.report.canvas import EDGE, TOP, World, factor_of, legend_of
+from hitplanes.weapons.report.overlay import Overlay
 from hitplanes.weapons.report.picture import picture_of_report
 from hitplanes.weapons.report.report import report_of
 from hitplanes.weapons.report.symbols import MARKS, TINT, glyph
@@ -274,6 +275,23 @@ def test_an_object_that_the_view_cuts_has_no_border_there() -> None:
         world = blank(scene, (2, 2, 9, 9), 8)
         draw(world)
         assert world.image.any() and not world.image[0, 0].any()
+
+
+@pytest.mark.parametrize(("radius", "named"), [(4, ["tank"]), (90, [])])
+def test_an_object_that_fills_the_picture_is_named_on_itself(radius: int, named: list[str]) -> None:
+    """Beside its samples, if they leave room."""
+    scene = Scene((64, 48))
+    scene.add(Sprite.from_mask(np.ones((48, 64), np.bool_), pivot_xy=(0, 0)), (0, 0), name="tank")
+    report = told(scene, (Disc(radius), (30, 20)))
+    view = 0, 0, 63, 47
+    overlay = Overlay(World(scene, None, view, factor_of(view)))
+    overlay.keep_free(report["shots"], scene)
+    samples = overlay.taken & ~overlay.bodies
+    overlay.names(report["shots"], scene)
+    assert [label.text for label in overlay.texts] == named
+    for label in overlay.texts:
+        place = samples[label.y - 14 : label.y + 4, label.x - 18 : label.x + 18]
+        assert place.shape == (18, 36) and samples.any() and not place.any()
 
 
 def test_the_legend_has_what_the_picture_has() -> None:

@@ -35,17 +35,25 @@ class Overlay:
         self.world, self.image, self.view, self.factor = world, world.image, world.view, world.factor
         self.taken: Bools = np.zeros(self.image.shape[:2], np.bool_)
         self.targets: Bools = self.taken.copy()
+        self.bodies: Bools = self.taken.copy()  # what is taken by nothing but an object that was hit
         self.texts: list[Text] = []
 
     def keep_free(self, shots: Sequence[Mapping[str, Any]], scene: Scene) -> None:
         """Reserve the samples, the objects that were hit, and the occluders that blocked, against labels."""
         runs = [of for shot in shots for of in shot["samples"].values()]
         items = {entry["object"] for shot in shots for entry in (*shot["rows"], *shot["blockers"])}
-        runs += [Spans.from_mask(*scene.mask(item)).runs() for item in items]
+        bodies = [Spans.from_mask(*scene.mask(item)).runs() for item in items]
         targets = scene.ids(Role.HITTABLE).tolist()[:OUTLINES_MAX]
-        self.taken |= enlarged(covered(self.view, runs), self.factor)
+        self.bodies = enlarged(covered(self.view, bodies), self.factor)
+        self.taken |= self.bodies
+        self.reserve(enlarged(covered(self.view, runs), self.factor))
         every = (Spans.from_mask(*scene.mask(item)).runs() for item in targets)
         self.targets |= enlarged(covered(self.view, every), self.factor)
+
+    def reserve(self, drawn: Bools) -> None:
+        """Keep labels away from pixels (h, w) of the picture."""
+        self.taken |= drawn
+        self.bodies &= ~drawn
 
     def shot(self, shot: Mapping[str, Any], number: int) -> None:
         """Draw a cross on the pixel of a shot and its number in a disc with a line to it; an arrow if out of view."""
@@ -82,8 +90,9 @@ class Overlay:
             seen = at[(at >= self.view[:2]).all(axis=1) & (at <= self.view[2:]).all(axis=1)]
             if len(seen):
                 name = scene.name_of(item)
-                if not self._label(name, box, INK, NEAR, seen):
-                    self._label(name, box, INK, CLOSE, seen)
+                if not any(self._label(name, box, INK, farthest, seen) for farthest in (NEAR, CLOSE)):
+                    body = covered(self.view, [Spans.from_mask(mask, (x, y)).runs()])
+                    self._label_on(name, enlarged(body, self.factor))
 
     def links(self, shots: Sequence[Mapping[str, Any]], hit: Set[int]) -> None:
         """Ring samples that an occluder kept from an object, and name both; objects that were not hit come first."""
@@ -119,7 +128,7 @@ class Overlay:
         nearest of the pixels (n, 2) of the world, or at the box.
         """
         text = short(text, 2 * NAME_MAX)
-        half_w, half_h = (LETTER * len(text) + 8) // 2, ROW // 2 + 1
+        half_w, half_h = _half_of(text)
         reaches = [(reach, free) for reach in (min(CLOSE, farthest), farthest) for free in (True, False)]
         spots = ((spot, free) for reach, free in reaches for spot in _around(box, half_w, half_h, reach))
         for (x, y), free in spots:
@@ -134,11 +143,30 @@ class Overlay:
             near = tuple((away[(away**2).sum(axis=1).argmin()] + (x, y)).tolist())
         if not free or abs(x - near[0]) > half_w + 8 or abs(y - near[1]) > half_h + 8:
             cv2.line(self.image, (x, y), near, color, 1)
+        self._write(text, x, y, color)
+        return True
+
+    def _label_on(self, text: str, body: Bools) -> None:
+        """Write a name on its own object, a mask (h, w), where nothing is marked: there is no room beside it."""
+        text = short(text, 2 * NAME_MAX)
+        half_w, half_h = _half_of(text)
+        free = body & self.bodies
+        rows, columns = np.nonzero(free[::ROW, ::LETTER])
+        spots = np.stack([columns * LETTER, rows * ROW], axis=1)
+        middle = spots.mean(axis=0) if len(spots) else 0
+        for x, y in spots[np.argsort(((spots - middle) ** 2).sum(axis=1), kind="stable")].tolist():
+            place = free[max(y - half_h, 0) : y + half_h, max(x - half_w, 0) : x + half_w]
+            if place.shape == (2 * half_h, 2 * half_w) and place.all():
+                self._write(text, x, y, INK)
+                return
+
+    def _write(self, text: str, x: int, y: int, color: tuple[int, int, int]) -> None:
+        """Write a text about a point of the picture, on a dark ground."""
+        half_w, half_h = _half_of(text)
         part = self.image[y - half_h : y + half_h, x - half_w : x + half_w]
         part[:] = (part.astype(np.uint16) * 60 + np.array(DARK, np.uint16) * 195) // 255
         self._take(x - half_w, y - half_h, x + half_w, y + half_h)
         self.texts.append(Text(x, y + 5, text, color, middle=True))
-        return True
 
     def _free(self, x: int, y: int, half_w: int, half_h: int) -> tuple[int, int]:
         """Free place for a rectangle around a point, else the nearest free place, else a place that is not free."""
@@ -156,11 +184,17 @@ class Overlay:
         return min(x0, y0) >= 0 and x1 <= width and y1 <= height and not self.taken[y0:y1, x0:x1].any()
 
     def _take(self, x0: int, y0: int, x1: int, y1: int) -> None:
-        self.taken[max(y0, 0) : max(y1, 0), max(x0, 0) : max(x1, 0)] = True
+        place = slice(max(y0, 0), max(y1, 0)), slice(max(x0, 0), max(x1, 0))
+        self.taken[place], self.bodies[place] = True, False
 
     def _at(self, x: int, y: int) -> tuple[int, int]:
         """Top left corner, in the picture, of a pixel of the world."""
         return (x - self.view[0]) * self.factor, (y - self.view[1]) * self.factor
+
+
+def _half_of(text: str) -> tuple[int, int]:
+    """Half the width and half the height of a label, px."""
+    return (LETTER * len(text) + 8) // 2, ROW // 2 + 1
 
 
 def _around(box: Box, half_w: int, half_h: int, farthest: int) -> Iterator[tuple[int, int]]:

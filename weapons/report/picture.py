@@ -124,7 +124,7 @@ def _shots(world: World, report: Mapping[str, Any], scene: Scene) -> list[Text]:
     labels, drawn = draw_rays(world, report)
     overlay = Overlay(world)
     overlay.keep_free(shots, scene)
-    overlay.taken |= drawn | moved
+    overlay.reserve(drawn | moved)
     for number, shot in enumerate(shots):
         overlay.shot(shot, number)
     overlay.distances(shots)
@@ -237,7 +237,7 @@ def _marked(world: World, report: Mapping[str, Any], numbered: Set[int]) -> list
         world.outline(item, "hit")
     numbers, drawn = draw_rays(world, report)
     overlay = Overlay(world)
-    overlay.taken |= drawn
+    overlay.reserve(drawn)
     for number, shot in enumerate(report["shots"]):
         if number in numbered:
             overlay.shot(shot, number)
