@@ -297,8 +297,8 @@ ERRORS: dict[str, tuple[Callable[[Scene, History], object], str]] = {
     "too few": (lambda s, h: fire(h, Point(), [(1, 1)] * 2, tick=[30]), r"tick: expected shape \(2,\), got \(1,\)"),
     "list of lists": (lambda s, h: fire(h, Point(), (1, 1), tick=[[30]]), r"tick: expected shape \(1,\), got \(1, 1\)"),
     "nan": (lambda s, h: fire(h, Point(), [(1, 1)] * 2, tick=[30, np.nan]), r"tick\[1\]: expected a finite number"),
-    "word": (lambda s, h: fire(h, Point(), (1, 1), tick="now"), r"tick: expected numbers, got \['now'\]"),
-    "true": (lambda s, h: fire(h, Point(), (1, 1), tick=True), "tick: expected numbers, got"),
+    "word": (lambda s, h: fire(h, Point(), (1, 1), tick="now"), r"tick: expected a number, got 'now'"),
+    "true": (lambda s, h: fire(h, Point(), (1, 1), tick=True), "tick: expected a number, got True"),
     "of a Scene": (lambda s, h: fire(s, Point(), (1, 1), tick=3), "tick: expected none, as a Scene has no past, got 3"),
     "of a moment": (lambda s, h: fire(h.at(30), Point(), (1, 1), tick=30), "tick: expected none, as a Scene has"),
     "no scene": (lambda s, h: fire(h.ticks, Point(), (1, 1)), "scene: expected a Scene or a History, got list"),  # type: ignore[arg-type]

@@ -108,7 +108,7 @@ def test_objects_are_told_by_id() -> None:
     assert repr(Scene()) == "<Scene 'scene', bounds None: empty>"
     with pytest.raises(InputError, match=r"ids\[1\]: expected an object in the scene, got 1, which was removed"):
         scene.position([a, b])
-    with pytest.raises(InputError, match=r"ids\[0\]: expected a whole number from 0 to 2, got 7"):
+    with pytest.raises(InputError, match=r"ids: expected a whole number from 0 to 2, got 7"):
         scene.layer(7)
     scene.rename(c, "boss")
     assert scene.find("boss") == c

@@ -18,7 +18,7 @@ from hitplanes.planes.scene.scene import Scene
 
 from .. import late
 from ..kinds.areas import Rays, ray_parts_of
-from ..kinds.placements import Shots, checked_shots
+from ..kinds.placements import OWNER_MAX, Shots, checked_shots
 from ..kinds.weapon import Weapon
 from .areas import Request, leave_out_unused, traits_of
 from .hits import Hits, Rows
@@ -218,14 +218,15 @@ def ready_for(scene: Scene | History, weapon: Weapon, filters: Filtering) -> Rea
 
 
 def _plain_owners(exclude: Any) -> tuple[int, ...] | None:
-    """Owners that one shot excludes; None if they are many, or not plain whole numbers."""
+    """Owners that one shot excludes; None if they are many, or not plain whole numbers in range."""
     if exclude is None:
         return ()
     if isinstance(exclude, np.ndarray) and exclude.ndim == 1 and exclude.dtype.kind in "iu":
         exclude = exclude.tolist()
     given = exclude if isinstance(exclude, tuple | list) else (exclude,)
     owners = tuple([int(owner) if isinstance(owner, np.integer) else owner for owner in given[: OWNERS_READY + 1]])
-    return owners if len(owners) <= OWNERS_READY and all(type(owner) is int for owner in owners) else None
+    plain = all(type(owner) is int and -1 <= owner <= OWNER_MAX for owner in owners)
+    return owners if plain and len(owners) <= OWNERS_READY else None
 
 
 def _ready_then(scene: Scene | History, weapon: Weapon, filters: Filtering, tick: object) -> Ready[Hits] | None:
