@@ -534,7 +534,7 @@ def test_labels_are_objects() -> None:
     assert scene.mask(scene.find("7"))[0].shape == (2, 2)
 
 
-@pytest.mark.parametrize("kind", [np.uint8, np.int64, np.uint64, "lists"])
+@pytest.mark.parametrize("kind", [np.uint8, np.int64, np.uint64, np.float32, "lists"])
 def test_labels_of_every_kind(kind: Any) -> None:
     labels = np.random.default_rng(3).integers(0, 5, (6, 9))
     given = labels.tolist() if kind == "lists" else labels.astype(kind)

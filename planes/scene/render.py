@@ -124,9 +124,6 @@ def plane_objects(field: str, role: str, array: npt.NDArray[Any]) -> list[tuple[
     if array.dtype.kind == "b":
         return [_cropped(field, role, array, 0, 0)]
     labels = integers(field, array, (None, None), 0, 2**31 - 1)
-    if array.dtype.kind == "f":  # as likely a mask as labels
-        how = "array > 0 makes a mask of it, and array.astype(int) makes labels"
-        raise InputError(f"{field}: expected booleans or whole numbers, got {array.dtype}: {how}")
     y, x = np.nonzero(labels)
     order = np.argsort(labels[y, x], kind="stable")
     y, x = y[order], x[order]
