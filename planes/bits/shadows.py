@@ -211,19 +211,22 @@ def seen_from(origin_xy: Ints, blockers: Blockers, blocker: Ints) -> Sequence[We
     down, up = (boxes[:, 1] > 0)[part], (boxes[:, 3] < 0)[part]
     low = np.where(up, boxes[part, 1], np.where(down, y_min, -FARTHEST))
     high = np.where(down, boxes[part, 3], np.where(up, y_max, FARTHEST))
-    near, far = 2 * np.where(down, y_min, -y_max) - 1, 2 * np.where(down, y_max, -y_min) + 1
-    sides = []
-    for side in (2 * x_min - 1, -2 * x_max - 1):  # in halves of a pixel, to the right, and to the left
-        away = np.where(side < 0, near, far)
-        slope = side / away  # of numbers below 2**22: different ones are different as floats, too
-        corner = (slope == least(slope, begin)[part]).nonzero()[0]
-        corner = corner[begins(part[corner])]
-        sides.append(np.stack([side[corner], away[corner]]))
-    apart = ((boxes[:, 1] > 0) | (boxes[:, 3] < 0)).nonzero()[0]
-    (left, right), under = (side[:, apart] for side in sides), boxes[apart, 1] > 0
-    rows = np.where(under, boxes[apart, 3] + 1, -FARTHEST), np.where(under, FARTHEST, boxes[apart, 1] - 1)
+    near, far = 2 * np.where(down, y_min, -y_max) - 1, 2 * np.where(down, y_max, -y_min) + 1  # in halves of a pixel
+    left, right = (_least(side, np.where(side < 0, near, far), begin, part) for side in (2 * x_min - 1, -2 * x_max - 1))
     right[0] *= -1
-    return [Wedges(place[begin[apart]], *rows, boxes[apart], left, right), Edges(place, low, high, rects)]
+    apart = ((boxes[:, 1] > 0) | (boxes[:, 3] < 0)).nonzero()[0]
+    under = boxes[apart, 1] > 0
+    rows = np.where(under, boxes[apart, 3] + 1, -FARTHEST), np.where(under, FARTHEST, boxes[apart, 1] - 1)
+    wedges = Wedges(place[begin[apart]], *rows, boxes[apart], left[:, apart], right[:, apart])
+    return [wedges, Edges(place, low, high, rects)]
+
+
+def _least(side: Ints, away: Ints, begin: Ints, part: Ints) -> Ints:
+    """The least quotient of `side` and `away` in each part, as numerators and denominators (2, n)."""
+    slope = side / away  # of numbers below 2**22, of which different ones are different as floats, too
+    corner = (slope == np.minimum.reduceat(slope, begin)[part]).nonzero()[0]
+    corner = corner[begins(part[corner])]
+    return np.stack([side[corner], away[corner]])
 
 
 def hide_behind(rows: Words, corner_xy: Ints, origin_xy: Ints, blockers: Blockers, pair: Ints, blocker: Ints) -> None:
