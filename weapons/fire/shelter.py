@@ -101,7 +101,10 @@ def sheltered(runs: Runs, placements: Placements, shots: Shots, stack: Stack, bl
 def sheltered_pixels(runs: Runs, placements: Placements, shots: Shots, stack: Stack, blockers: Blockers) -> Ints:
     """Number of sheltered pixels (P,) of each placement in runs."""
     counts = np.zeros(len(placements.xy), np.int64)
-    for part in pieces(np.full(len(runs), max(len(blockers.rects), 1)), CHUNK_CELLS):
+    placement, blocker = _near(runs, placements, shots, stack, blockers)
+    rects = np.bincount(placement, (blockers.begin[1:] - blockers.begin[:-1])[blocker], len(counts))
+    runs = runs.take(np.flatnonzero(rects[runs.placement]))
+    for part in pieces(rects[runs.placement].astype(np.int64), CHUNK_CELLS):
         strip = runs.take(part)
         near = _near(strip, placements, shots, stack, blockers)
         np.add.at(counts, strip.placement, late.shadows.sheltered_pixels(strip, placements.xy, blockers, *near))
