@@ -1,6 +1,6 @@
 """Blockers: items that hide what lies behind them, with the rectangles that cover their masks.
 
-Large masks are covered block by block, near the shots alone. Rectangles that touch, also at corners, are a connected
+Large masks are covered block by block, only near the shots. Rectangles that touch, also at corners, are a connected
 part; those of a part follow each other.
 """
 
@@ -62,7 +62,8 @@ class Blockers(NamedTuple):
     def rects_of(self, blocker: Ints, origin_xy: Ints) -> tuple[Ints, Ints, Bools]:
         """Rectangles of blockers (k,), seen from origins (k, 2), as (place in `blocker`, (m, 4), first of a part).
 
-        None is empty. What the bounds leave of a part may not be connected, so each rectangle of such an item is one.
+        No rectangle is empty. What the bounds leave of a part may not be connected, so each rectangle of an item that
+        they cut counts as a part of its own.
         """
         place, number = ragged((self.begin[1:] - self.begin[:-1])[blocker])
         rect = self.begin[blocker][place] + number

@@ -45,10 +45,12 @@ NEAREST = 4
 """Blockers of a row in the first round; each later round has as many as those before it."""
 
 FARTHEST = 2**40
-"""A row beyond all others, px."""
+"""A row, and a distance, beyond all others, px."""
 
 FEW_WAYS = 2**8
-"""Most pairs of a way and a blocker, or a rectangle, that are looked at at once, without sorting some out first."""
+"""Most pairs of a way and a blocker that need neither an angle test nor rounds, and most rectangles without wedges: for
+so few these cost more than they save.
+"""
 
 FULL = np.uint64(2**64 - 1)
 NO_RECT = np.array([[1, 1, -1, -1]])
@@ -73,10 +75,10 @@ def ways_met(boxes_xyxy: Ints, origin_xy: Ints, blockers: Blockers) -> Iterator[
 
 
 def nearest_first(row: Ints, blocker: Ints, origin_xy: Ints, blockers: Blockers) -> Iterator[tuple[Ints, Ints]]:
-    """Sorted pairs (k,) of a row and a blocker, in rounds: those of blockers near the row's origin come first.
+    """Sorted pairs (k,) of a row and a blocker, in rounds: blockers near the row's origin come first.
 
-    In a crowd few blockers leave most rows dark, and what is dark has to be asked no others. Those around the origin
-    come last, as what is ignored up to an exit takes long.
+    In a crowd the nearest blockers leave most rows dark, and a dark row need not be asked about the others. Pairs of a
+    round are sorted by row. If what a way begins in is ignored up to its exit, which takes long, it comes last.
     """
     if len(row) <= FEW_WAYS:
         yield row, blocker
@@ -449,7 +451,6 @@ def _hidden(
     runs: Runs, origin_xy: Ints, blockers: Blockers, placement: Ints, blocker: Ints
 ) -> tuple[Ints, Ints, Ints, Ints]:
     """Stretches of runs that blockers shelter, as (pair, run, x_first, x_last); those of a pair may overlap."""
-    x, y = origin_xy[placement].T
     origin, pair, found = origin_xy[placement], np.arange(len(placement)), []
     if blockers.until_exit:
         begun, rects, begin, count = _begun(origin, blockers, blocker)
@@ -478,7 +479,7 @@ def _hidden(
 
 
 def _runs_of_rows(runs: Runs, placement: Ints, low: Ints, high: Ints) -> tuple[Ints, Ints]:
-    """First run, and last + 1, of placements (k,) in rows `low` .. `high`; none if it is not below the last."""
+    """First run, and last + 1, of placements (k,) in rows `low` .. `high`; where there is none, they are no range."""
     top, end = int(runs.y.min(initial=0)), int(runs.y.max(initial=0)) + 1
     line, before = runs.placement * (end - top + 1) + runs.y - top, placement * (end - top + 1) - top
     return line.searchsorted(before + np.clip(low, top, end)), line.searchsorted(

@@ -105,7 +105,7 @@ def surely_fits(sprite: Sprite, transform: Transform) -> bool:
 
 
 Carved = tuple[tuple[int, Box], ...]
-"""The last masks of its size that a mask was carved out of, the last first: number, and box of the hole in it."""
+"""The masks of the same size before a carved one, the latest first: number, and box of the hole made in it."""
 
 
 @dataclass(eq=False)  # a frozen one takes six times as long to make
