@@ -21,7 +21,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -112,9 +111,13 @@ def _begun(origin_xy: Ints, blockers: Blockers, blocker: Ints) -> tuple[Ints, In
     box = blockers.box_xyxy[blocker]
     near = np.flatnonzero(((box[:, :2] <= origin_xy) & (origin_xy <= box[:, 2:])).all(axis=1))
     place, rects, _ = blockers.rects_of(blocker[near], origin_xy[near])
-    begun = sorted_once(place[((rects[:, :2] <= 0) & (rects[:, 2:] >= 0)).all(axis=1)])
+    begun = sorted_once(place[_holds_origin(rects)])
     first = place.searchsorted(begun)
     return near[begun], rects, first, place.searchsorted(begun, side="right") - first
+
+
+def _holds_origin(rects: Ints) -> Bools:
+    return np.asarray(((rects[:, :2] <= 0) & (rects[:, 2:] >= 0)).all(axis=1))
 
 
 # house: hit rule of areas
@@ -427,10 +430,8 @@ def shelter_of(runs: Runs, origin_xy: Ints, blockers: Blockers, placement: Ints,
     origin_xy : (P, 2) pixels from which the ways of placements begin
     placement, blocker : (k,) pairs whose blocker may shelter a sample
     """
-    pair, run, first, last = _hidden(runs, origin_xy, blockers, placement, blocker)
-    which, first, last = merged_runs(pair * len(runs) + run, first, last)
-    pair, run = pair[which], run[which]
-    start = np.cumsum(runs.lengths) - runs.lengths - runs.x_first
+    pair, run, first, last = _hidden_by_pairs(runs, origin_xy, blockers, placement, blocker)
+    start = runs.start
     count = np.zeros((2, int(runs.lengths.sum()) + 1), np.int64)
     rank = blockers.rank[blocker[pair]]
     for row, weight in enumerate((np.ones_like(rank), rank)):
@@ -438,6 +439,15 @@ def shelter_of(runs: Runs, origin_xy: Ints, blockers: Blockers, placement: Ints,
         np.subtract.at(count[row], start[run] + last + 1, weight)
     items, ranks = np.cumsum(count, axis=1)[:, :-1]
     return Shelter(items, ranks)
+
+
+def _hidden_by_pairs(
+    runs: Runs, origin_xy: Ints, blockers: Blockers, placement: Ints, blocker: Ints
+) -> tuple[Ints, Ints, Ints, Ints]:
+    """Stretches of runs that the blocker of each pair shelters, as (pair, run, x_first, x_last), sorted and apart."""
+    pair, run, first, last = _hidden(runs, origin_xy, blockers, placement, blocker)
+    which, first, last = merged_runs(pair * len(runs) + run, first, last)
+    return pair[which], run[which], first, last
 
 
 def sheltered_pixels(runs: Runs, origin_xy: Ints, blockers: Blockers, placement: Ints, blocker: Ints) -> Ints:
@@ -459,32 +469,31 @@ def _hidden(
         pair = np.delete(pair, begun)
     for seen in seen_from(origin[pair], blockers, blocker[pair]):
         of = pair[seen.place]
-        begin, end = _runs_of_rows(runs, placement[of], seen.low + origin[of, 1], seen.high + origin[of, 1])
-        for piece in pieces(np.maximum(end - begin, 0), CHUNK_SAMPLES):
-            rect, place = ragged(np.maximum(end - begin, 0)[piece])
+        begin, count = runs.in_rows(placement[of], seen.low + origin[of, 1], seen.high + origin[of, 1])
+        for piece in pieces(count, CHUNK_SAMPLES):
+            rect, place = ragged(count[piece])
             rect += piece.start
-            run, (x, y) = begin[rect] + place, origin[of[rect]].T
-            first, last, bare_first, bare_last = seen.columns(rect, runs.y[run] - y)
-            first, last = np.maximum(first, runs.x_first[run] - x), np.minimum(last, runs.x_last[run] - x)
-            bare = (bare_first <= bare_last).nonzero()[0]
-            after = np.maximum(bare_last[bare] + 1, first[bare]), last[bare]
-            last[bare] = np.minimum(bare_first[bare] - 1, last[bare])
-            for every, low, high in ((slice(None), first, last), (bare, *after)):
-                kept = (low <= high).nonzero()[0]
-                own, shift = of[rect[every][kept]], x[every][kept]
-                stretch = (side[kept].astype(np.int64) + shift for side in (low, high))
-                found.append((own, run[every][kept], *stretch))
+            run, own = begin[rect] + place, of[rect]
+            for which, first, last in _stretches(runs, run, origin[own], seen, rect):
+                found.append((own[which], run[which], first, last))
     columns = [np.concatenate(column) for column in zip(*found, strict=True)]
     return columns[0], columns[1], columns[2], columns[3]
 
 
-def _runs_of_rows(runs: Runs, placement: Ints, low: Ints, high: Ints) -> tuple[Ints, Ints]:
-    """First run, and last + 1, of placements (k,) in rows `low` .. `high`; where there is none, they are no range."""
-    top, end = int(runs.y.min(initial=0)), int(runs.y.max(initial=0)) + 1
-    line, before = runs.placement * (end - top + 1) + runs.y - top, placement * (end - top + 1) - top
-    return line.searchsorted(before + np.clip(low, top, end)), line.searchsorted(
-        before + np.clip(high, top - 1, end) + 1
-    )
+def _stretches(
+    runs: Runs, run: Ints, origin_xy: Ints, seen: Edges | Wedges, rect: Ints
+) -> Iterator[tuple[Ints, Ints, Ints]]:
+    """Stretches of runs (k,) that a rectangle or wedge of each hides, as (place in `run`, x_first, x_last)."""
+    x, y = origin_xy.T
+    first, last, bare_first, bare_last = seen.columns(rect, runs.y[run] - y)
+    first, last = np.maximum(first, runs.x_first[run] - x), np.minimum(last, runs.x_last[run] - x)
+    bare = (bare_first <= bare_last).nonzero()[0]  # these split what is hidden
+    after = np.maximum(bare_last[bare] + 1, first[bare]), last[bare]
+    last[bare] = np.minimum(bare_first[bare] - 1, last[bare])
+    for every, low, high in ((np.arange(len(run)), first, last), (bare, *after)):
+        kept = (low <= high).nonzero()[0]
+        which = every[kept]
+        yield which, low[kept].astype(np.int64) + x[which], high[kept].astype(np.int64) + x[which]
 
 
 def _hidden_after_exit(runs: Runs, placement: int, pair: int, origin_xy: Ints, rects: Ints) -> list[tuple[Ints, ...]]:
@@ -540,37 +549,25 @@ def sheltered_by(
     own : (s,) rank of an item that does not shelter the sample, or -1
     """
     soonest, blocker_rank = np.full(len(own), NEVER), np.full(len(own), -1)
-    begin = np.cumsum(runs.lengths) - runs.lengths - runs.x_first
-    begun = set(_begun(origin_xy[placement], blockers, blocker)[0].tolist())
-    for pair, run, first, last in _stretches_of(runs, origin_xy, blockers, placement, blocker):
-        which, column = each_pixel(first, last)
-        sample, origin = begin[run[which]] + column, origin_xy[placement[pair]]
-        rank = int(blockers.rank[blocker[pair]])
-        kept = (wanted[sample] & (own[sample] != rank)).nonzero()[0]
-        sample, x, y = sample[kept], column[kept] - origin[0], runs.y[run[which[kept]]] - origin[1]
-        time = np.zeros_like(x)
-        if pair not in begun or blockers.until_exit:
-            rects = blockers.rects_of(blocker[pair : pair + 1], origin[None])[1]
-            time = _entered(rects, x, y, pair in begun)
+    pair, run, first, last = _hidden_by_pairs(runs, origin_xy, blockers, placement, blocker)
+    begin, start = begins(pair).nonzero()[0], runs.start
+    for k, part in zip(pair[begin].tolist(), np.split(np.arange(len(pair)), begin[1:]), strict=False):
+        stretch, column = each_pixel(first[part], last[part])
+        on, origin, rank = run[part][stretch], origin_xy[placement[k]], int(blockers.rank[blocker[k]])
+        kept = (wanted[start[on] + column] & (own[start[on] + column] != rank)).nonzero()[0]
+        sample, x, y = (start[on] + column)[kept], column[kept] - origin[0], runs.y[on[kept]] - origin[1]
+        rects = blockers.rects_of(blocker[k : k + 1], origin[None])[1]
+        time = _entered(rects, x, y, blockers.until_exit)
         sooner = (time < soonest[sample]).nonzero()[0]
         soonest[sample[sooner]], blocker_rank[sample[sooner]] = time[sooner], rank
     return blocker_rank
 
 
-def _stretches_of(
-    runs: Runs, origin_xy: Ints, blockers: Blockers, placement: Ints, blocker: Ints
-) -> Iterator[tuple[int, Ints, Ints, Ints]]:
-    """Stretches of runs that the blocker of each pair shelters, as (pair, run, x_first, x_last)."""
-    pair, run, first, last = _hidden(runs, origin_xy, blockers, placement, blocker)
-    which, first, last = merged_runs(pair * len(runs) + run, first, last)
-    pair, run = pair[which], run[which]
-    edges = np.append(begins(pair).nonzero()[0], len(pair)).tolist()
-    for begin, end in pairwise(edges):
-        yield int(pair[begin]), run[begin:end], first[begin:end], last[begin:end]
-
-
-def _entered(rects: Ints, x: Ints, y: Ints, begun: bool) -> Ints:
+def _entered(rects: Ints, x: Ints, y: Ints, until_exit: bool) -> Ints:
     """When ways from pixel (0, 0) to pixels (s,) first enter a rectangle that shelters them, as in `_times`."""
+    begun = bool(_holds_origin(rects).any())
+    if begun and not until_exit:
+        return np.zeros_like(x)
     parts = [np.zeros(0, np.int64)]
     step = max(CHUNK_SAMPLES // len(rects), 1)
     for first in range(0, len(x), step):

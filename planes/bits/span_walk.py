@@ -77,6 +77,18 @@ class Runs(Columns):
         """Samples of each run."""
         return self.x_last - self.x_first + 1
 
+    @property
+    def start(self) -> Ints:
+        """Number of the sample at x = 0 of each run, even if the run does not contain x = 0."""
+        return np.asarray(np.cumsum(self.lengths) - self.lengths - self.x_first)
+
+    def in_rows(self, placement: Ints, low: Ints, high: Ints) -> tuple[Ints, Ints]:
+        """First run and number of runs of placements (k,) in rows `low` .. `high`, none if `low` is greater."""
+        top, end = int(self.y.min(initial=0)), int(self.y.max(initial=0)) + 1
+        line, before = self.placement * (end - top + 1) + self.y, placement * (end - top + 1)
+        first = line.searchsorted(before + np.clip(low, top, end))
+        return first, np.maximum(line.searchsorted(before + np.clip(high, top - 1, end - 1), side="right") - first, 0)
+
 
 @dataclass(frozen=True, eq=False)
 class Pairs:
@@ -127,7 +139,7 @@ def walk(
     kind, keep = pairs.kind, np.where(ends(pairs.kind, pierce), ~LIVE & 31, 31).astype(np.uint8)
     pair, run, x_first, x_last = _meetings(runs, pairs, stack)
     box, item = stack.box_xyxy, pairs.rank[pair]
-    sample = (np.cumsum(runs.lengths) - runs.lengths - runs.x_first)[run]
+    sample = runs.start[run]
     texel = stack.offset[item] + (runs.y[run] - box[item, 1]) * stack.width[item] - box[item, 0]
     emitted = [(np.zeros(0, np.int64), np.zeros(0, np.int64), kind[:0])]
     for now in _steps(pairs, pair):
@@ -170,17 +182,9 @@ def _steps(pairs: Pairs, pair: Ints) -> Iterator[Ints]:
 
 def _meetings(runs: Runs, pairs: Pairs, stack: Stack) -> tuple[Ints, Ints, Ints, Ints]:
     """Stretches of runs inside the boxes of the items that they are paired with: (pair, run, x_first, x_last)."""
-    if not len(runs):
-        none = np.zeros(0, np.int64)
-        return none, none, none, none
-    low, high = int(runs.y.min()), int(runs.y.max())
-    rows = high - low + 1
-    row = runs.placement * rows + (runs.y - low)
     box = stack.box_xyxy[pairs.rank]
-    top, bottom = np.maximum(box[:, 1], low), np.minimum(box[:, 3], high)
-    first = np.searchsorted(row, pairs.placement * rows + (top - low))
-    last = np.searchsorted(row, pairs.placement * rows + (bottom - low), side="right")
-    pair, place = ragged(np.where(top <= bottom, last - first, 0))
+    first, count = runs.in_rows(pairs.placement, box[:, 1], box[:, 3])
+    pair, place = ragged(count)
     run = first[pair] + place
     x_first = np.maximum(runs.x_first[run], box[pair, 0])
     x_last = np.minimum(runs.x_last[run], box[pair, 2])

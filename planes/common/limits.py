@@ -58,7 +58,9 @@ CHUNK_SAMPLES = 2**18
 numbers (placement * rows, group * rows) below 2**62."""
 
 CHUNK_PAIRS = 2**21  # (placement, item) box tests made at a time: 2 MB of booleans
-CHUNK_CELLS = 2**19  # cells of rays on items worked on at a time, about: each takes some 150 bytes of working memory
+CHUNK_CELLS = (
+    2**19
+)  # cells of rays on items, or stretches of rows behind them, worked on at a time: some 150 bytes each
 BOXES_MAX = 64  # most boxes of a box cover of one mask: with more, testing the mask itself is faster
 OUTLINE_PIXELS = 2**18  # most blocks of an outline; a larger mask is traced in coarser blocks
 OUTLINE_CORNERS = 4096  # most corners of an outline before it is simplified: each corner is compared with all others

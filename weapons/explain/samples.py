@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence, Set
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -116,11 +115,6 @@ class Detail:
     sheltered: Bools  # whether an item on the way to a sample decided
     bounds: Box | None  # of the scene
 
-    @cached_property
-    def start(self) -> Ints:
-        """Index of the sample at x = 0 of each run, even if the run does not contain x = 0."""
-        return np.asarray(np.cumsum(self.runs.lengths) - self.runs.lengths - self.runs.x_first)
-
     def on(self, rank: int) -> Ints:
         """Samples that lie on an item of the stack."""
         x0, y0, x1, y1 = self.stack.box_xyxy[rank].tolist()
@@ -129,7 +123,7 @@ class Detail:
         meets = np.flatnonzero((first <= last) & (runs.y >= y0) & (runs.y <= y1))
         piece, x = each_pixel(first[meets], last[meets])
         run = meets[piece]
-        return np.asarray((self.start[run] + x)[self.stack.mask(rank)[runs.y[run] - y0, x - x0]])
+        return np.asarray((self.runs.start[run] + x)[self.stack.mask(rank)[runs.y[run] - y0, x - x0]])
 
 
 def samples_of(detail: Detail) -> Samples:
@@ -275,7 +269,7 @@ def detail_of(context: QueryContext, weapon: Weapon, shots: Shots) -> Detail:
     shelter = None if blockers is None else sheltered(runs, placements, shots, stack, blockers)
     events, state = walk(runs, pairs, stack, context.pierce, HIT | BLOCK | SKIP | SHELTERED, shelter)
     rank = np.full(len(x), -1, np.int64)
-    start = np.cumsum(runs.lengths) - runs.lengths - runs.x_first
+    start = runs.start
     ended = rank.copy()
     for kind in (SKIP, BLOCK, HIT):  # the first of a kind counts; a hit outranks a block, a block a skip
         latest = events.take(np.flatnonzero(events.kind == kind)[::-1])

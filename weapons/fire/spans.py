@@ -117,15 +117,11 @@ def direct(placements: Placements, shots: Shots, context: QueryContext, counted:
     pairs = Pairs(placement, rank, _kinds(rank, placements.shot[placement], shots, context))
     runs = _under_items(placements, pairs, context)
     context.plan.run("samples", "runs where items may be", runs.nbytes)
-    besides = None
     if counted and context.blockers is not None:
         every = boxes if context.bounds is None else clipped(boxes, context.bounds)
         laid = _laid(placements, np.arange(len(boxes)), every)
-        besides = late.shelter.sheltered_pixels(laid, placements, shots, context.stack, context.blockers)
-    walked = _walked(placements, shots, runs, pairs, context, counts, besides)
-    if besides is not None:
-        counts[:, Verdict.OCCLUDED] += besides
-        counts[:, Verdict.EMPTY] -= besides
+        _shelter(counts, late.shelter.sheltered_pixels(laid, placements, shots, context.stack, context.blockers))
+    walked = _walked(placements, shots, runs, pairs, context, counts, counted)
     return _met(placements, runs, walked, counts, context.plan)
 
 
@@ -160,15 +156,9 @@ def _kinds(rank: Ints, shot: Ints, shots: Shots, context: QueryContext) -> Kinds
 
 
 def _walked(
-    placements: Placements,
-    shots: Shots,
-    runs: Runs,
-    pairs: Pairs,
-    context: QueryContext,
-    counts: Ints,
-    sheltered: Ints | None,
+    placements: Placements, shots: Shots, runs: Runs, pairs: Pairs, context: QueryContext, counts: Ints, counted: bool
 ) -> list[Events]:
-    """Walk runs strip by strip, add to the counts, and take their pixels off the sheltered ones (P,)."""
+    """Walk runs strip by strip, and add to the counts; if `counted`, sheltered samples stand in them already."""
     found, plan = [], context.plan
     for strip in pieces(runs.lengths, CHUNK_SAMPLES) if len(runs) else ():
         part = runs.take(strip)
@@ -183,11 +173,17 @@ def _walked(
         plan.run("walk", "samples through the stack, front to back", state.nbytes + events.nbytes)
         met = state != LIVE
         _count(counts, np.repeat(part.placement, part.lengths)[met], state[met], None)
-        if sheltered is not None:
+        if counted and shelter is not None:
             hidden = np.repeat(part.placement, part.lengths)[(state & SHELTERED) != 0]
-            sheltered -= np.bincount(hidden, minlength=len(sheltered))
+            _shelter(counts, -np.bincount(hidden, minlength=len(counts)))
         plan.run("verdicts", "")
     return found
+
+
+def _shelter(counts: Ints, samples: Ints) -> None:
+    """Move sheltered samples (P,) from EMPTY to OCCLUDED."""
+    counts[:, Verdict.OCCLUDED] += samples
+    counts[:, Verdict.EMPTY] -= samples
 
 
 def _count(counts: Ints, placement: Ints, state: Ints, samples: Ints | None) -> None:
