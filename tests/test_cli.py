@@ -21,6 +21,7 @@ from test_record import lines_of, write_record
 from hitplanes import (
     Disc,
     Rifle,
+    Scene,
     ShotRecord,
     Spread,
     Sprite,
@@ -457,6 +458,15 @@ def test_an_object_without_a_pixel_is_noted(tmp_path: Path, capsys: pytest.Captu
     (tmp_path / "scene.json").write_text(json.dumps({"format": "hitplanes-scene/2", "objects": objects}))
     assert main(["report", str(tmp_path), "-o", str(tmp_path / "r.png")]) == 0
     assert "note: ghost has no pixel: nothing hits it" in capsys.readouterr().out
+
+
+def test_shots_that_do_not_fit_the_picture_are_noted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    scene = Scene((3000, 100))
+    scene.shots = [{"weapon": {"kind": "disc", "radius": 4}, "at": [x, 50]} for x in (10, 2900)]
+    scene.save(tmp_path)
+    assert main(["report", str(tmp_path), "-o", str(tmp_path / "r.png")]) == 0
+    note = "note: 1 of 2 shots does not fit this picture (x 0..2048, y 0..99): report it alone"
+    assert note in capsys.readouterr().out
 
 
 def test_a_closed_output_is_no_traceback(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from hitplanes.weapons.report.canvas import RING, World, heat_step, plain
 from hitplanes.weapons.report.cards import CELL, COLUMNS, ROWS, inset_of, shot_card
 from hitplanes.weapons.report.differences import differences
 from hitplanes.weapons.report.overlay import LETTER, ROW, SHOT_BADGE, Overlay
-from hitplanes.weapons.report.phrases import fragile
+from hitplanes.weapons.report.phrases import fragile, unseen
 from hitplanes.weapons.report.picture import picture_of_report
 from hitplanes.weapons.report.report import SHOTS_MAX, heat_of, report_of
 from hitplanes.weapons.report.symbols import HEAT, MARKS
@@ -258,6 +258,23 @@ def test_a_shot_out_of_view_is_pointed_at() -> None:
     right, up = overlaid(scene, report, 8).texts
     width, height = (report["view_xyxy"][i + 2] - report["view_xyxy"][i] + 1 for i in (0, 1))
     assert right.x > width * 8 - 60 and up.y < 60 and height
+
+
+def test_shots_that_do_not_fit_the_picture_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With what it shows; to report a shot alone helps only if the picture is a part of the scene."""
+    wide = Scene((3000, 1000))
+    wide.add(Sprite.circle(30), (400, 300))
+    wide.add(Sprite.circle(30), (2800, 300))
+    report = report_of(wide, [fire(wide, Disc(40), at) for at in ((400, 300), (2790, 300), (2190, 600))])
+    told = "2 of 3 shots do not fit this picture (x 144..2192, y 0..999): report each alone"
+    texts: list[Any] = []
+    monkeypatch.setattr("hitplanes.weapons.report.picture.draw_texts", lambda page, every: texts.extend(every))
+    picture_of_report(report, wide)
+    assert [text.text for text in texts if "picture" in text.text] == [f"{told}; 3 shots, 2 objects hit"]
+    assert unseen(report_of(wide, [fire(wide, Disc(40), (2790, 300))]), wide.extent()) == ""
+    small = street()
+    report = report_of(small, [fire(small, Disc(3), at) for at in ((20, 20), (-900, 20), (-46, 20))])
+    assert unseen(report, small.extent()) == "1 of 3 shots does not fit this picture (x -48..59, y 0..39)"
 
 
 def test_the_inset_shows_the_pixels_around_the_first_hit() -> None:

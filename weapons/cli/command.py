@@ -27,7 +27,7 @@ from ..replay.shot_log import REPORTED_MAX, ShotRequest, fire_request, request_f
 from ..replay.stream import Progress, fire_log
 from ..report.cards import place_text
 from ..report.differences import differences
-from ..report.phrases import counted
+from ..report.phrases import counted, unseen
 from ..report.picture import picture_of_difference, picture_of_report
 from ..report.report import report_of
 from .report_file import read_report
@@ -379,6 +379,8 @@ def report(arguments: argparse.Namespace) -> None:
             sys.stdout.write(text)
     with redirect_stdout(sys.stderr) if piped else nullcontext():
         _note_empty(scene)
+        if note := unseen(facts, scene.extent()):
+            _say(f"note: {note}")
         _print_hits(facts, fired if arguments.plan else [])
 
 

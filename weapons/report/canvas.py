@@ -17,7 +17,7 @@ from hitplanes.planes.scene.objects import Role
 from hitplanes.planes.scene.render import GROUND, draw_view
 from hitplanes.planes.scene.scene import Scene
 
-from .phrases import counted
+from .phrases import counted, unseen
 from .symbols import (
     HEAT,
     MARKS,
@@ -305,7 +305,10 @@ def page_of(
     left = (width - image.shape[1]) // 2
     page[TOP : TOP + image.shape[0], left : left + image.shape[1]] = image
     every = [text._replace(x=text.x + left, y=text.y + TOP) for text in texts]
-    every += [Text(EDGE, 28, clipped(report["scene"]["name"], width // 2), INK, bold=True), _summary(report, width)]
+    note = unseen(report, world.scene.extent()) if world.scene is not None else ""
+    summary = _summary(report, width, note)
+    room = min(width // 2, width - 3 * EDGE - text_width(summary.text)) if note else width // 2
+    every += [Text(EDGE, 28, clipped(report["scene"]["name"], room), INK, bold=True), summary]
     every += legend.draw(page, EDGE, TOP + image.shape[0] + 14)
     for card, (x, y) in zip(cards, places, strict=True):
         every += card.draw(page, x, y, wide)
@@ -407,14 +410,16 @@ def _outlined(kind: str) -> Image:
     return mark_of(border, OUTLINES[kind][0])
 
 
-def _summary(report: Mapping[str, Any], width: int) -> Text:
+def _summary(report: Mapping[str, Any], width: int, note: str) -> Text:
+    """What was fired and hit, after a note that must be seen."""
     shots, batch = report["shots"], report["batch"]
     objects = {entry["object"] for shot in shots for entry in shot["rows"]}
     objects |= {entry["object"] for entry in (batch["objects"] if batch else ())}
     text = f"{counted(batch['shots'] if batch else len(shots), 'shot')}, {counted(len(objects), 'object')} hit"
     if report.get("now", {}).get("tick") is not None:
         text = f"tick {report['now']['tick']:g}: {text}"
-    return Text(width - EDGE, 28, text, FAINT, right=True)
+    text = clipped(f"{note}; {text}", width - 3 * EDGE) if note else text
+    return Text(width - EDGE, 28, text, INK if note else FAINT, right=True)
 
 
 def _footer(report: Mapping[str, Any], width: int, height: int) -> list[Text]:

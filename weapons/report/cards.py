@@ -199,7 +199,8 @@ def batch_cards(report: Mapping[str, Any]) -> list[Card]:
     if "filter" in report:
         lines.append(["volumes are drawn for a few shots only; cells for all"])
     if batch["heat"]["beyond"]:
-        lines.append([f"{batch['heat']['beyond']} samples beyond the picture"])
+        x, y, x_max, y_max = report["view_xyxy"]
+        lines.append([f"{batch['heat']['beyond']} samples beyond the picture (x {x}..{x_max}, y {y}..{y_max})"])
     return [Card(None, ", ".join(report["weapons"]), total, batch["verdicts"], None, lines)]
 
 

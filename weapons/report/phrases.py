@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from itertools import chain
 from typing import Any
 
 from hitplanes.planes.common.limits import FRAGILE_PX, SUB, WEIGHT_FULL
+from hitplanes.planes.grid.spans import Box
 
 SLANT = 1 + 2**0.5  # tangent of 67.5 degrees: a direction within 22.5 degrees of an axis has one word, any other two
 LEAST_TOLD = 0.05  # least distance that is not rounded to 0.0, px
@@ -32,6 +34,26 @@ def _way(shift_xy: Sequence[float]) -> str:
     words = ["up" if y < 0 else "down"] * (high * SLANT >= wide)
     words += ["left" if x < 0 else "right"] * (wide * SLANT >= high)
     return " ".join(words)
+
+
+def unseen(report: Mapping[str, Any], extent: Box) -> str:
+    """How many shots do not fit the picture, and what it shows of a scene of an extent; empty if all shots fit."""
+    x, y, x_max, y_max = view = report["view_xyxy"]
+    shots, cut = report["shots"], sum(not _fits(shot, view) for shot in report["shots"])
+    if not cut:
+        return ""
+    whole = x <= extent[0] and y <= extent[1] and x_max >= extent[2] and y_max >= extent[3]
+    alone = "" if whole or len(shots) == 1 else f": report {'it' if cut == 1 else 'each'} alone"
+    verb = "does" if cut == 1 else "do"
+    return f"{cut} of {counted(len(shots), 'shot')} {verb} not fit this picture (x {x}..{x_max}, y {y}..{y_max}){alone}"
+
+
+def _fits(shot: Mapping[str, Any], view: Box) -> bool:
+    """Whether the pixel of a shot, and its samples within the bounds, lie in a view."""
+    x, y = shot["at_xy"]
+    within = (runs for verdict, runs in shot["samples"].items() if verdict not in ("outside", "beyond"))
+    runs = chain([(y, x, x)], *within)
+    return all(view[1] <= y <= view[3] and view[0] <= first and last <= view[2] for y, first, last in runs)
 
 
 def short(name: str, most: int = NAME_MAX) -> str:
