@@ -310,7 +310,7 @@ def test_shares_blockers_and_why_not() -> None:
 @pytest.mark.parametrize("strategy", WAYS)
 def test_the_plan_says_what_may_shelter(strategy: str) -> None:
     near, far = (fire(street(), Disc(9, line_of_sight="all"), at, strategy=strategy).plan for at in ((38, 15), (9, 9)))
-    assert {stage.name: stage.why for stage in near.ran}["line of sight"] == "2 items may shelter"
+    assert {stage.name: stage.why for stage in near.ran}["line of sight"] == "items that may shelter: 2"
     left_out = {stage.name: stage.why for stage in far.left_out}
     assert left_out["line of sight"] == "no item near the shots may shelter" and not far.has_run("line of sight")
     assert not fire(street(), Disc(9), (9, 9), strategy=strategy).plan.has_run("line of sight")

@@ -313,6 +313,11 @@ def test_a_plan_is_told_as_a_table() -> None:
     ]
 
 
+def test_a_plan_is_printed_as_a_table() -> None:
+    told = told_plan(("shots", "1 checked", 64, None, 1_500), hud="none")
+    assert str(told).splitlines() == plan_lines(told.timed()) and "hud    left out" in str(told)
+
+
 def test_plans_are_added_up() -> None:
     total = PlanSum()
     total.add(told_plan(("sieve", "boxes", 10, (1, 4), 1_000), ("walk", "it", 1, None, 500), hud="none"))

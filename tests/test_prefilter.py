@@ -230,7 +230,7 @@ def test_the_plan_tells_what_was_tested() -> None:
 def test_a_broad_phase_that_no_sample_needed_is_left_out() -> None:
     scene = crowd(3, 30)
     told = fire(scene, Disc(3), (60, 60), strategy="visible").plan
-    assert why(told.left_out, "broad phase") == "visible: cells" and told.has_left_out("volumes")
+    assert why(told.left_out, "broad phase") == "the pre-filter lists tiles by cells" and told.has_left_out("volumes")
     told = fire(Scene(), Disc(3), (60, 60), prefilter="circle", strategy="spans").plan
     for stage in ("volumes", "pre-filter"):
         assert why(told.left_out, stage) == "no sample needed the stack"

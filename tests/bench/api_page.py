@@ -65,6 +65,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
 
 VALUES = {"ALL": "All categories: the default of `accept`.", "__version__": "The installed version, a text."}
 RESULTS = {
+    "hitplanes.weapons.fire.plan": ("Plan", "Stage"),
     "hitplanes.weapons.explain.owners": ("OwnerRow",),
     "hitplanes.weapons.fire.hits": ("HitRow",),
     "hitplanes.weapons.explain.samples": ("Samples", "Share", "Blocked", "Behind", "WhyNot"),
@@ -75,10 +76,10 @@ RESULTS = {
 }
 """What answers are made of; nobody imports it."""
 
-GIVEN = {"Hits", "RayHits", "Ready", "PastScene", "Planes", "Cells", "Work"}
+GIVEN = {"Hits", "RayHits", "Ready", "PastScene", "Planes", "Plan", "Cells", "Work"}
 """Classes whose objects calls give: nobody makes one."""
 
-INSIDE = {"items", "sides"}
+INSIDE = {"items", "sides", "run", "leave_out", "leave_out_all", "joined"}
 """What only the library reads."""
 
 PROPERTIES = property, cached_property, cached_attribute
@@ -283,7 +284,7 @@ def page() -> str:
     lines += ["## What answers are made of", ""]
     for module, group in RESULTS.items():
         for name in group:
-            lines += result_lines(name, getattr(import_module(module), name))
+            lines += (lines_of if name in GIVEN else result_lines)(name, getattr(import_module(module), name))
     for module, group in list(MODULES.items())[1:]:
         lines += [f"## `{module}`", "", escaped(doc_of(import_module(module)).split("\n\n")[0]), ""]
         for name in group:

@@ -193,7 +193,7 @@ def refuse_starts(request: Request, shots: Shots, placements: Placements) -> Non
 def _windows(placements: Placements, plan: Plan) -> PatternBits:
     """Bit rows of the patterns of placements."""
     windows = placements.table.bits
-    plan.run("patterns", f"{len(placements.table)} distinct", placements.nbytes)
+    plan.run("patterns", f"different patterns: {len(placements.table)}", placements.nbytes)
     if len(windows.sums):
         plan.run("weights", "falloff of the hit pixels, by sums along rows")
     return windows
@@ -251,7 +251,7 @@ def by_integers(request: Request) -> list[Rows]:
     ground = Ground(request.stack, tiles, boxes_xyxy, request.pierce, request.bounds, request.covers)
     plan.run("tiles", "bit rows of the masks", 0 if tiles.whole else ground.boxes_xyxy.nbytes)
     patterns = placements.table.bigs
-    plan.run("patterns", f"{len(patterns)} distinct", placements.nbytes)
+    plan.run("patterns", f"different patterns: {len(patterns)}", placements.nbytes)
     if request.traits.weighted:
         plan.run("weights", "falloff of the hit pixels, by the binary digits of their weights")
     near = accepted(met_boxes(placements.boxes, ground.boxes_xyxy), ground, shots, placements.shot)
@@ -272,7 +272,7 @@ def leave_out_unused(request: Request, way: str) -> None:
 def _unused(
     way: str, candidates: Candidates, has: tuple[bool, bool, bool], imagery: Sequence[Role]
 ) -> Iterator[tuple[str, str]]:
-    yield "broad phase", "visible: cells" if way == "visible" else candidates.why_unindexed
+    yield "broad phase", "the pre-filter lists tiles by cells" if way == "visible" else candidates.why_unindexed
     if not candidates.prefilter.volume:
         yield "volumes", "boxes are the pre-filter" if candidates.prefilter == BOX else "no pre-filter"
     yield from absent(candidates.stack, *has)

@@ -174,7 +174,7 @@ def fire_anew(
         return fired(scene, weapon, shots, how, plan)
     moments = moments_of(scene, tick, len(shots))
     parts: list[Hits] = []
-    plan.run("past", f"{len(moments)} scenes of it")
+    plan.run("past", f"moments of it: {len(moments)}")
     for past, rows in moments:
         parts.append(fired(past, weapon, shots.pick(rows), how, Plan() if parts else plan))
     if len(parts) == 1:
@@ -321,7 +321,7 @@ def _request_of(scene: Scene, weapon: Weapon, shots: Shots, how: How, plan: Plan
         if blockers is None:
             plan.leave_out("line of sight", "no item near the shots may shelter")
         else:
-            plan.run("line of sight", f"{len(blockers.rank)} items may shelter", blockers.nbytes)
+            plan.run("line of sight", f"items that may shelter: {len(blockers.rank)}", blockers.nbytes)
     filtered = how[:2] != AUTO[:2]
     looked_up = filtered or how[2] == "spans" or not traits.fits  # else boxes are compared as samples are counted
     candidates = chosen_candidates(*how[:2], scene, stack, placements if looked_up else 0)

@@ -53,7 +53,7 @@ class Stage:
 
 
 class Plan:
-    """Stages of a call in the order in which they ran, and those left out.
+    """Stages of a call in the order in which they ran, and those left out; `print(hits.plan)` prints them as a table.
 
     It is a lap timer, started when it is made: a stage takes the time since the previous one ended, so the times add
     up to that of the call. Reports leave the times out: see `timed`. During the call only notes are taken; they become
@@ -144,6 +144,10 @@ class Plan:
 
     def __repr__(self) -> str:
         return f"Plan(ran={self.ran}, left_out={self.left_out})"
+
+    def __str__(self) -> str:
+        """The table that `hitplanes report --plan` prints."""
+        return "\n".join(plan_lines(self.timed()))
 
     @property
     def ns(self) -> int:

@@ -47,7 +47,7 @@ def by_spans(request: Request) -> list[Rows]:
     first = placements_for(request.weapon, shots.take(0, 1))
     for begin, part in chunks(shots, first, request.candidates):
         placements = first if len(shots) == 1 else placements_for(request.weapon, part)
-        plan.run("patterns", f"{len(placements.table)} distinct", placements.nbytes)
+        plan.run("patterns", f"different patterns: {len(placements.table)}", placements.nbytes)
         if placements.table.prefix is not None:
             plan.run("weights", "falloff of the hit pixels, by prefix sums", placements.table.prefix.nbytes)
         refuse_starts(request, part, placements)

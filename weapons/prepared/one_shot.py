@@ -209,7 +209,7 @@ class OneShot(Hits, list[HitRow]):
         """Plan of the shot."""
         plan = Plan()
         if type(self.scene) is not Scene:
-            plan.run("past", "1 scenes of it")
+            plan.run("past", "moments of it: 1")
         plan.run("prepared", "the weapon is ready for the scene; the stages after it ran when they were asked for")
         if self._arguments[:2] == (None, None):
             plan.leave_out_all(unaimed, self.weapon)

@@ -76,7 +76,7 @@ def fired_rays(
     for begin in range(0, max(len(shots), 1), step):
         part = shots.take(begin, min(begin + step, len(shots)))
         rays = rays_of(parts, part)
-        plan.run("rays", "both ends on the grid", rays.nbytes)
+        plan.run("rays", "both ends, rounded to 1/256 px", rays.nbytes)
         if ends_at_first(ray):
             ends = _first_ends(rays, ray, part, through, chosen.way, choose)
             first = FirstHits(rays, ray, ends, through.stack)
