@@ -78,6 +78,18 @@ def test_single_pixels_make_the_same_spans(runs: Runs) -> None:
     assert make([(y, x, x) for x, y in runs_of(runs)]) == make(runs)
 
 
+def test_a_set_made_by_hand_is_checked_when_it_is_asked() -> None:
+    some = Spans(np.array([3, 4]), np.array([1, 7]), np.array([2, 9]))
+    assert some.count == 5 and some.box_xyxy == (1, 3, 9, 4) and some.union(some) == some
+    assert Spans([3], [1], [2]).translated(2, -3).runs().tolist() == [[0, 3, 4]]  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=r"^x_last\[1\]: expected at least x_first, 7, got 6$"):
+        _ = Spans(np.array([3, 4]), np.array([1, 7]), np.array([2, 6])).count
+    with pytest.raises(InputError, match=r"^dx: expected a whole number"):
+        some.translated(0.5, 0)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=r"^spans: expected Spans, got list"):
+        some.union([3])  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize(
     ("runs", "told"),
     [
@@ -96,6 +108,9 @@ def test_runs_are_of_whole_pixels(runs: Any, told: str) -> None:
         Spans.from_runs(*runs)
     with pytest.raises(InputError, match=told.replace("^", "^pixels: ")):
         fit.box(Spans(*runs))
+    for ask in (lambda s: s.count, lambda s: s.box_xyxy, lambda s: s.translated(1, 0), lambda s: s.union(s)):
+        with pytest.raises(InputError, match=told):
+            ask(Spans(*runs))
     assert Spans.from_runs([4, 3], (7.0, 1), [9, 2]).runs().tolist() == [[3, 1, 2], [4, 7, 9]]  # type: ignore[arg-type]
 
 

@@ -16,7 +16,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 import numpy.typing as npt
 
-from ..common.checks import Bools, Floats, Ints, bools, integers
+from ..common.checks import Bools, Floats, InputError, Ints, bools, integer, integers, kind_of
 from ..common.limits import POSITION_MAX
 
 Box = tuple[int, int, int, int]
@@ -130,6 +130,20 @@ def checked_runs(y: object, x_first: object, x_last: object) -> tuple[Ints, Ints
     return rows, first, last
 
 
+def columns_of(spans: object) -> tuple[Ints, Ints, Ints]:
+    """The columns of a set, which are checked if it was made by hand."""
+    if not isinstance(spans, Spans):
+        raise InputError(f"spans: expected Spans, got {kind_of(spans)}")
+    y, *_ = columns = spans.y, spans.x_first, spans.x_last
+    if not all(type(c) is np.ndarray and c.dtype == np.int64 and c.shape == (y.size,) for c in columns):
+        y, *_ = columns = checked_runs(*columns)
+    empty = np.flatnonzero(columns[1] > columns[2])
+    if len(empty):
+        _, first, last = (int(column[empty[0]]) for column in columns)
+        raise InputError(f"x_last[{empty[0]}]: expected at least x_first, {first}, got {last}")
+    return columns
+
+
 def area(boxes_xyxy: Ints) -> int:
     """Sum of the pixels of inclusive boxes."""
     sides = boxes_xyxy[:, 2:] - boxes_xyxy[:, :2] + 1
@@ -198,14 +212,14 @@ class Spans:
     @cached_property
     def count(self) -> int:
         """Number of pixels of the set."""
-        return int(self.lengths.sum())
+        _, first, last = columns_of(self)
+        return int((last - first + 1).sum())
 
     @cached_property
     def box_xyxy(self) -> Box | None:
         """(x_min, y_min, x_max, y_max), inclusive; None for the empty set."""
-        if not len(self):
-            return None
-        return int(self.x_first.min()), int(self.y[0]), int(self.x_last.max()), int(self.y[-1])
+        y, first, last = columns_of(self)
+        return (int(first.min()), int(y.min()), int(last.max()), int(y.max())) if len(y) else None
 
     def to_mask(self) -> tuple[Bools, tuple[int, int]]:
         """Mask (h, w) of the box of the set, and the position of its pixel [0, 0]."""
@@ -229,14 +243,14 @@ class Spans:
 
     def translated(self, dx: int, dy: int) -> Spans:
         """Shift the set by whole pixels."""
-        return Spans(self.y + dy, self.x_first + dx, self.x_last + dx)
+        most = 2 * POSITION_MAX
+        dx, dy = integer("dx", dx, -most, most), integer("dy", dy, -most, most)
+        y, first, last = columns_of(self)
+        return Spans(y + dy, first + dx, last + dx)
 
     def union(self, other: Spans) -> Spans:
         """Pixels of either set."""
-        y = np.concatenate([self.y, other.y])
-        return Spans.from_runs(
-            y, np.concatenate([self.x_first, other.x_first]), np.concatenate([self.x_last, other.x_last])
-        )
+        return Spans.from_runs(*map(np.concatenate, zip(columns_of(self), columns_of(other), strict=True)))
 
 
 Strip = tuple[int, int, int, int]
