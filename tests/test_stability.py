@@ -351,6 +351,7 @@ def test_an_interrupt_before_the_first_answer_leaves_the_last_run(
     with_predicates(monkeypatch, named("circles", ours=interrupted))
     assert main(["stability", "--quick", "-o", str(tmp_path)]) == 130
     assert {path.read_text() for path in tmp_path.iterdir()} == {"of before"}
+    assert main(["stability", "--quick", "-o", str(tmp_path / "new")]) == 130 and not (tmp_path / "new").exists()
 
 
 def test_a_line_tells_how_far_it_is(few: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -427,6 +427,19 @@ def test_an_interrupted_study_keeps_what_it_measured(tmp_path: Path, monkeypatch
     assert not (folder / "rays.png").exists() and len((folder / "study.csv").read_text().splitlines()) == 7
 
 
+def test_an_interrupt_before_anything_is_measured_leaves_no_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(study_module, "measured", interrupted)
+    (tmp_path / "mine").mkdir()
+    for name in ("study", "mine"):
+        assert main(["study", "--quick", "-o", str(tmp_path / name)]) == 130
+    assert [path.name for path in tmp_path.iterdir()] == ["mine"]
+
+
 def test_an_interrupt_before_anything_is_measured_leaves_the_last_study(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -509,16 +509,18 @@ def new_folder(folder: Path) -> Iterator[list[Path]]:
         raise
 
 
-def own_folder(folder: Path, names: Sequence[str]) -> None:
-    """Make a folder, or accept one that holds only files of these names; else an InputError."""
+def own_folder(folder: Path, names: Sequence[str]) -> bool:
+    """Make a folder, or accept one that holds only files of these names, and return whether it is new."""
     with possible(f"--output: cannot make {folder}"):
         if folder.exists() and not folder.is_dir():
             raise InputError(f"--output: expected a folder, got the file {folder}")
+        new = not folder.exists()
         folder.mkdir(exist_ok=True)
         held = sorted(path.name for path in folder.iterdir() if path.name not in names)
     if held:
         got = f"got {folder} with {held[0]!r} in it"
         raise InputError(f"--output: expected a new folder, or that of an earlier run, {got}")
+    return new
 
 
 def cleared(folder: Path, names: Sequence[str]) -> None:

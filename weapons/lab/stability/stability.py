@@ -260,7 +260,7 @@ def run_stability(folder: Path, seed: int = 0, quick: bool = False, stream: Text
     """
     seed = integer("seed", seed, 0, SEED_MAX)
     folder = path_of("output", folder)
-    own_folder(folder, FILES)
+    made = own_folder(folder, FILES)
     study = Study(seed, quick, versions("hitplanes", "numpy", *filter(installed, PEERS)))
     progress = Progress(stream, "decisions")
     try:
@@ -268,6 +268,8 @@ def run_stability(folder: Path, seed: int = 0, quick: bool = False, stream: Text
     except KeyboardInterrupt:
         progress.clear()
         if not any(cell.rows for cell in study.cells):
+            if made:
+                folder.rmdir()
             raise  # keep the files of an earlier run
         _write(study, folder)
         raise KeyboardInterrupt(f"what was asked so far is in {folder}; it is not complete") from None

@@ -384,7 +384,7 @@ def write_study(
     Returned are the study as JSON, and the names of the questions that have a diagram.
     """
     folder = path_of("output", folder)
-    own_folder(folder, FILES)
+    made = own_folder(folder, FILES)
     kept: dict[str, Any] = {}
 
     def keep(study: dict[str, Any]) -> None:
@@ -398,6 +398,8 @@ def write_study(
     except KeyboardInterrupt:
         progress.clear()
         if not kept:
+            if made:
+                folder.rmdir()
             raise
         _write_tables(kept, folder, error)
         raise KeyboardInterrupt(f"what was measured is in {folder}") from None
