@@ -16,7 +16,7 @@ from hitplanes.weapons.report.canvas import RING, World, heat_step, plain
 from hitplanes.weapons.report.cards import CELL, COLUMNS, ROWS, inset_of, shot_card
 from hitplanes.weapons.report.differences import differences
 from hitplanes.weapons.report.overlay import LETTER, ROW, SHOT_BADGE, Overlay
-from hitplanes.weapons.report.phrases import fragile, unseen
+from hitplanes.weapons.report.phrases import fragile, short, unseen
 from hitplanes.weapons.report.picture import picture_of_report
 from hitplanes.weapons.report.report import SHOTS_MAX, heat_of, report_of
 from hitplanes.weapons.report.symbols import HEAT, MARKS
@@ -258,6 +258,20 @@ def test_a_shot_out_of_view_is_pointed_at() -> None:
     right, up = overlaid(scene, report, 8).texts
     width, height = (report["view_xyxy"][i + 2] - report["view_xyxy"][i] + 1 for i in (0, 1))
     assert right.x > width * 8 - 60 and up.y < 60 and height
+
+
+def test_long_names_are_cut_in_their_middle() -> None:
+    """They often differ at their ends."""
+    assert [short("a crate of the north wall 7", most) for most in (27, 24, 9, 8)] == [
+        "a crate of the north wall 7", "a crate of ...rth wall 7", "a c...l 7", "a c... 7"
+    ]  # fmt: skip
+    scene = Scene((60, 40))
+    for number in (1, 2):
+        scene.add(Sprite.circle(8), (20 * number, 20), name=f"{'a crate ' * 9}{number}")
+    shot = report_of(scene, [fire(scene, Disc(30), (30, 20))])["shots"][0]
+    card = shot_card(shot, 0, scene)
+    names = [text.text for text in card.draw(np.zeros((card.height, 464, 3), np.uint8), 0, 0, 464)]
+    assert sum(name.startswith("a crate") and name.endswith(" 1") for name in names) == 1
 
 
 def test_shots_that_do_not_fit_the_picture_are_told(monkeypatch: pytest.MonkeyPatch) -> None:

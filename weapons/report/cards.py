@@ -15,7 +15,7 @@ from hitplanes.planes.files.png import cv2
 from hitplanes.planes.scene.scene import Scene
 
 from . import phrases
-from .canvas import CARD, FAINT, INK, LETTER, LINE, Text, World, clipped
+from .canvas import CARD, FAINT, INK, LETTER, LINE, Text, World, clipped, text_width
 from .differences import reason
 from .overlay import draw_arrows
 from .phrases import NAME_MAX, counted, fragile, percent, short
@@ -110,14 +110,23 @@ class Card:
             color = FAINT if len(cells) == 1 or cells[0] == HEADER[0] else INK
             if len(cells) == 2:  # object and reason
                 texts.append(Text(x + wide - 10, base, clipped(cells[1], wide * 3 // 5), FAINT, right=True))
-                texts.append(Text(x + 10, base, clipped(cells[0], wide * 2 // 5 - 20), FAINT))
+                texts.append(Text(x + 10, base, _name_in(wide * 2 // 5 - 20, cells[0]), FAINT))
                 continue
             cell_width = CELL_WIDTH if len(cells) < MANY else NARROW
             room = wide - 20 - cell_width * (len(cells) - 1)
-            texts.append(Text(x + 10, base, clipped(cells[0], room), color))
+            named = clipped(cells[0], room) if len(cells) == 1 else _name_in(room, cells[0])
+            texts.append(Text(x + 10, base, named, color))
             for column, cell in enumerate(reversed(cells[1:])):
                 texts.append(Text(x + wide - 10 - cell_width * column, base, cell, color, right=True))
         return texts
+
+
+def _name_in(room: int, name: str) -> str:
+    """A name cut in its middle to a width, px."""
+    most = min(len(name), max(room // 2, 5))  # a letter is at least two pixels wide
+    while text_width(short(name, most)) > room and most > 5:
+        most -= 1
+    return short(name, most)
 
 
 def shot_card(shot: Mapping[str, Any], number: int, scene: Scene, now: str | None = None) -> Card:

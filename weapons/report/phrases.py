@@ -57,8 +57,9 @@ def _fits(shot: Mapping[str, Any], view: Box) -> bool:
 
 
 def short(name: str, most: int = NAME_MAX) -> str:
-    """Name cut to at most so many letters."""
-    return name if len(name) <= most else name[: most - 3] + "..."
+    """Name cut to at most so many letters, in its middle, as names often differ at their ends."""
+    left, right = most // 2 - 1, most - most // 2 - 2
+    return name if len(name) <= most else f"{name[:left]}...{name[-right:]}"
 
 
 def percent(share: float) -> str:
