@@ -52,6 +52,7 @@ from hitplanes import (  # fmt: skip
     weapons_of,
     write_png,
 )
+from hitplanes.planes.common.checks import choice
 from hitplanes.weapons.cli.report_file import read_report
 from hitplanes.weapons.cli.starter import write_starter
 from hitplanes.weapons.lab.demo import moments, write_demo, write_frames, write_gif
@@ -117,7 +118,7 @@ ARRAYS: dict[str, tuple[Any, str]] = {
     "decimals": ([Decimal(1), Decimal(2)], "at: expected numbers, got .*Decimal"),
     "one number": (5, r"at: expected shape \(any, 2\), got \(\)"),
     "empty row": ([[]], r"at: expected shape \(any, 2\), got \(1, 0\)"),
-    "three numbers": ((1, 2, 3), r"at: expected shape \(any, 2\), got \(3,\)"),
+    "three numbers": ((1, 2, 3), r"at: expected shape \(2,\) or \(any, 2\), got \(3,\)"),
     "columns for rows": (np.zeros((2, 5)), r"at: expected shape \(any, 2\), got \(2, 5\)"),
     "three dimensions": (np.zeros((1, 1, 2)), r"at: expected shape \(any, 2\), got \(1, 1, 2\)"),
     "ragged": ([(1, 2), (3,)], r"at: expected an array with rows of one length, got \[\(1, 2\), \(3,\)\]"),
@@ -220,7 +221,7 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
     "categories, bits of no dimension": (
         lambda: world().add(Sprite.circle(1), categories=np.array(3)), "categories: expected bits or a list"),
     "owner to come": (
-        lambda: world().add(Sprite.circle(1), owner=9), "owner: expected a whole number from 0 to 3, got 9"),
+        lambda: world().add(Sprite.circle(1), owner=9), "owner: expected a whole number from 0 to 2, got 9"),
     "name, too long": (lambda: world().add(Sprite.circle(1), name="x" * 201), "name: expected a text of 1 to 200"),
     # change, remove, ask
     "ids, None": (lambda: world().position(None), "^ids: expected a number, got None$"),  # type: ignore[arg-type]
@@ -229,7 +230,10 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
     "scale of a set, a text": (lambda: world().set(0, scale="x"), "^scale: expected a number, got 'x'$"),
     "layer of a set, true": (lambda: world().set(0, layer=True), "^layer: expected a number, got True$"),
     "ids, negative": (lambda: world().move(-1, (0, 0)), r"ids: expected a whole number from 0 to 2, got -1"),
-    "ids, removed": (lambda: world().remove([0, 2]), r"ids\[1\]: expected an object in the scene, got 2, which was re"),
+    "ids, removed": (
+        lambda: world().remove([0, 2]),
+        r"ids\[1\]: expected an object in the scene, got 2, which was removed; the nearest are \[1\]$"),
+    "no near name": (lambda: choice("name", "fast", ["cast", "walk"]), "expected one of 'cast', 'walk', got 'fast'$"),
     "ids, twice": (lambda: world().remove([0, 1, 0]), r"ids\[2\]: expected each object once, got 0 again"),
     "ids, booleans": (lambda: world().remove([True, False]), r"ids: expected numbers, got \[True, False\]"),
     "ids, a name": (lambda: world().remove("duck"), r"ids: expected ids, got .duck.: scene\.find\(name\) is"),
@@ -332,7 +336,7 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
     "circle": (lambda: Sprite.circle(-1), "^radius: expected a number from 0 to 32768, got -1"),
     "box": (lambda: Sprite.box(5, -1), "^height: expected a number from 0 to 32768, got -1"),
     # weapons
-    "ring inside out": (lambda: Ring(5, 3), "inner_radius: expected at most 3.0, got 5.0"),
+    "ring inside out": (lambda: Ring(5, 3), "inner_radius: expected at most outer_radius, 3.0, got 5.0"),
     "box weapon of half a pixel": (
         lambda: Box(2.5, 3), "width: expected a whole number from 1 .*got 2.5"),  # type: ignore[arg-type]
     "radius, text": (lambda: Disc("3"), "radius: expected a number, got '3'"),  # type: ignore[arg-type]

@@ -75,6 +75,10 @@ def pose_again(scene: Scene, item: int, pose: dict[str, Any]) -> None:
     scene.set(item, **{key: [value] if key == "scale" else value for key, value in pose.items()})
 
 
+def samples_of_a_shot() -> Any:
+    return fire(Scene(), Disc(2), (3, 3)).samples_at(0)
+
+
 def rows(pixels: Pixels) -> np.ndarray:
     return np.array(sorted(pixels), np.int64).reshape(-1, 2)
 
@@ -480,6 +484,7 @@ def test_hits_must_be_of_the_scene_as_it_is() -> None:
         ({0: Spans([25, 26], [3], [4])}, r"pixels\[0\]: x_first: expected shape \(2,\), got \(1,\)"),
         ({0: Spans([25], ["a"], [4])}, r"pixels\[0\]: x_first: expected numbers, got \['a'\]"),
         ({0: Spans(np.array([25]), np.array([-(2**63)]), np.array([40]))}, r"pixels\[0\]: x_first\[0\]: expected"),
+        ({0: samples_of_a_shot()}, r"pixels\[0\]: expected Spans .*, got Samples: pass its \.xy$"),
         ({"hill": [[1, 1]]}, "id of pixels: expected a whole number from 0 to 1, got 'hill'"),
     ],
 )

@@ -746,7 +746,7 @@ NAN, INF = math.nan, math.inf
 AT = [(0, 0), (1, 1)]
 BAD: list[tuple[dict[str, Any], str]] = [
     ({"weapon": "disc"}, r"weapon: expected a weapon, got str"),
-    ({"at": (0, 0, 0)}, r"at: expected shape \(any, 2\)"),
+    ({"at": (0, 0, 0)}, r"at: expected shape \(2,\) or \(any, 2\), got \(3,\)"),
     ({"at": [[]]}, r"at: expected shape"),
     ({"at": "x"}, r"at: "),
     ({"at": None}, r"at: expected numbers"),
@@ -967,7 +967,7 @@ def test_rows_by_number_and_as_an_array(weapon: Weapon, prepared: bool) -> None:
     assert hits[-1] == rows[-1] and hits[1:] == rows[1:] and hits[::-1] == rows[::-1] and hits[5:2] == []
     assert all(type(value) in (int, tuple) for value in hits[0])
     for wrong, error in ((len(rows), IndexError), (-len(rows) - 1, IndexError), (0.5, TypeError), ("0", TypeError)):
-        with pytest.raises(error):
+        with pytest.raises(error, match=rf"^hits: expected the number of one of {len(rows)} rows, .*, got {wrong!r}"):
             hits[wrong]
 
     table = hits.to_numpy()

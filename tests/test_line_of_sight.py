@@ -239,7 +239,7 @@ def test_a_start_in_an_occluder() -> None:
         return [row.pixels for row in hits]
 
     assert hit("hit") == [] and hit("ignore_until_exit") == [2]
-    with pytest.raises(InputError, match=rf"at\[0\]: expected a start outside .* got one inside of id {wall}"):
+    with pytest.raises(InputError, match=rf"at\[0\]: expected a start outside .* got one inside of id {wall}, '"):
         hit("error")
     with pytest.raises(InputError, match=r"at\[1\]: .* id 0"):
         fire(scene, Disc(1, line_of_sight="occluders", inside="error"), [(7, 0), (4, 0)])

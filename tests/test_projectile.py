@@ -220,7 +220,7 @@ def test_a_start_inside_is_a_hit_at_once_or_ignored_or_an_error() -> None:
     through = fire(scene, Projectile(100, 2, inside="ignore_until_exit"), (0, 0))
     assert through.passes.object.tolist() == [beyond]
     assert through.passes.entry.tolist() == [0.38]
-    with pytest.raises(InputError, match=r"at\[0\]: expected a start outside of every item, got one inside of id 0"):
+    with pytest.raises(InputError, match=r"at\[0\]: expected a start outside of every item, got one inside of id 0, '"):
         fire(scene, Projectile(100, 2, inside="error"), (0, 0))
     assert len(fire(scene, Projectile(100, 2, inside="error"), (7, 0))) == 1
 

@@ -137,7 +137,7 @@ def test_a_start_inside_is_named_by_its_row_in_any_part(
         gun = Gun(range=9, inside="error", **around)  # type: ignore[arg-type]
         shots = [Shot((20 if i in bad else 0, 20)) for i in range(6)]
         battle = Battle(gun, shots, [bar(90, 99), bar(19, 21, 19, 21), bar(19, 21, 19, 21, occluder=True)])
-        told = f"at[{bad[0]}]: expected a start outside of every item, got one inside of id 2"
+        told = f"at[{bad[0]}]: expected a start outside of every item, got one inside of id 2, 'occluder 2'"
         with pytest.raises(InputError) as caught:
             battle.fired()
         assert str(caught.value) == told

@@ -386,6 +386,16 @@ def test_a_mask_that_would_be_too_large_changes_nothing() -> None:
     assert state(scene) == before
 
 
+def test_to_move_nothing_changes_nothing() -> None:
+    scene = three()
+    before = scene.version
+    for ids, xy in (([], []), (np.zeros(0, np.int64), np.zeros((0, 2))), ([], (3, 4))):
+        scene.move(ids, xy)
+    assert scene.version == before
+    with pytest.raises(InputError, match="xy"):
+        scene.move([], [(1, 2)])
+
+
 def test_a_removed_object_is_named() -> None:
     scene = three()
     scene.remove(1)
@@ -419,7 +429,7 @@ def test_a_change_of_no_objects_is_no_error() -> None:
         ({"frame": 1}, "frame: expected a whole number from 0 to 0, got 1"),
         ({"layer": 0.5}, "layer: expected a whole number"),
         ({"layer": None}, "layer: expected a whole number"),
-        ({"owner": 4}, "owner: expected a whole number from 0 to 3, got 4"),
+        ({"owner": 4}, "owner: expected a whole number from 0 to 2, got 4"),
         ({"role": "hittible"}, "role: .*did you mean 'hittable'"),
         ({"categories": ["targte"]}, "categories: .*did you mean 'target'"),
         ({"categories": -1}, "categories: expected a whole number"),

@@ -258,7 +258,7 @@ BAD: list[tuple[Any, str]] = [
     ({**DISC, "radius": 2**20 + 1}, "radius: expected a number from 0 to"),
     ({**DISC, "pierce": 1}, "pierce: expected true or false"),
     ({**DISC, "falloff": "lineer"}, "did you mean 'linear'?"),
-    ({"kind": "ring", "inner_radius": 5, "outer_radius": 4}, "inner_radius: expected at most 4"),
+    ({"kind": "ring", "inner_radius": 5, "outer_radius": 4}, "inner_radius: expected at most outer_radius, 4"),
     ({"kind": "box", "width": 2.5, "height": 3}, "width: expected a whole number"),
     ({"kind": "box", "width": 0, "height": 3}, "width: expected a whole number"),
     ({"kind": "polygon", "points": [[0, 0], [1, 1]]}, "points: expected 3 points or more, got 2"),

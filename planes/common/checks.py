@@ -193,11 +193,12 @@ def boxes_in(field: str, name: object) -> int | None:
 
 
 def suggestion(value: object, names: Iterable[str]) -> str:
-    """Text that suggests the nearest name, in whatever case it was written; empty if none is near."""
+    """Text that suggests the nearest name with the same first letter, in whatever case; empty if none is near."""
     import difflib  # only an error needs it
 
-    folded = {name.casefold(): name for name in names}
-    near = difflib.get_close_matches(value.casefold(), folded, n=1) if isinstance(value, str) else []
+    text = value.casefold() if isinstance(value, str) else ""
+    folded = {name.casefold(): name for name in names if name[:1].casefold() == text[:1]}
+    near = difflib.get_close_matches(text, folded, n=1)
     return f" (did you mean {folded[near[0]]!r}?)" if near else ""
 
 

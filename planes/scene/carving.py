@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
-from ..common.checks import Bools, InputError, Ints, integers, shown, within
+from ..common.checks import Bools, InputError, Ints, integers, kind_of, shown, within
 from ..common.limits import HALF, MASK_AREA_MAX, POSITION_MAX, SUB
 from ..grid.fixed_point import over_one, rounded_div, turned
 from ..grid.spans import Box, Spans, checked_runs
@@ -91,6 +91,8 @@ def hole_of(field: str, pixels: object, mask: Bools, corner_xy: tuple[int, int])
         with within(field):
             y, x, x_last = checked_runs(pixels.y, pixels.x_first, pixels.x_last)
     else:
+        if isinstance(pixels, tuple) and hasattr(pixels, "xy"):  # a named tuple, as samples_at gives
+            raise InputError(f"{field}: expected Spans or whole numbers (n, 2), got {kind_of(pixels)}: pass its .xy")
         x, y = integers(field, pixels, (None, 2), -POSITION_MAX, POSITION_MAX).T
         x_last = x
     (height, width), (left, top) = mask.shape, corner_xy

@@ -25,10 +25,11 @@ def points(field: str, values: object, n: int, limit: float = POSITION_MAX) -> F
 
 
 def are_rows(ids: object, xy: object) -> bool:
-    """Whether these are contiguous arrays of ids (n,) and of positions (n, 2)."""
+    """Whether these are contiguous arrays of ids (n,) and of positions (n, 2), n > 0."""
     if type(ids) is not np.ndarray or type(xy) is not np.ndarray or ids.dtype != np.int64 or xy.dtype != np.float64:
         return False
-    return ids.ndim == 1 and xy.shape == (len(ids), 2) and ids.flags.c_contiguous and xy.flags.c_contiguous
+    fit = ids.ndim == 1 and len(ids) > 0 and xy.shape == (len(ids), 2)
+    return fit and ids.flags.c_contiguous and xy.flags.c_contiguous
 
 
 def one_place(xy: object) -> tuple[int, int] | None:

@@ -180,11 +180,13 @@ class Scene:
         velocity_xy: object,
     ) -> dict[str, object]:  # fmt: skip
         """Check what a new object has in each column."""
+        own = self._items.count  # the id that it gets
+        is_own = owner is None or (isinstance(owner, int | np.integer) and type(owner) is not bool and owner == own)
         return {
             "role": ROLES.index(role),
             "layer": integer("layer", layer, -LAYER_MAX, LAYER_MAX),
             "categories": self._bits(categories, default_bits(role)),
-            "owner": self._items.count if owner is None else integer("owner", owner, 0, self._items.count),
+            "owner": own if is_own else integer("owner", owner, 0, max(own - 1, 0)),
             "cost": integer("cost", cost, 0, COST_MAX),
             "position_256": place_256("position_xy", position_xy, POSITION_MAX),
             "velocity_256": place_256("velocity_xy", velocity_xy, REACH_MAX),
@@ -206,7 +208,8 @@ class Scene:
         elif are_rows(ids, xy) and self._items.move_risen(ids, xy):  # type: ignore[arg-type]
             return
         rows = self._existing(ids)
-        self._items.move(rows, snap(points("xy", xy, len(rows))))
+        if len(at := points("xy", xy, len(rows))):
+            self._items.move(rows, snap(at))
 
     def set(
         self, ids: int | Sequence[int] | Ints, *, sprite: object = None, position_xy: object = None,
@@ -500,8 +503,10 @@ class Scene:
         rows = table.rows(given)
         gone = np.flatnonzero(rows < 0)
         if len(gone):
-            item = given[gone[0]]
-            raise InputError(f"ids[{gone[0]}]: expected an object in the scene, got {item}, which was removed")
+            item, there = int(given[gone[0]]), self.ids()
+            near = there[max(there.searchsorted(item) - 1, 0) :][:2].tolist()
+            said = f"ids[{gone[0]}]: expected an object in the scene, got {item}, which was removed"
+            raise InputError(said + f"; the nearest are {near}")
         return rows
 
     def _existing(self, ids: object) -> Ints:

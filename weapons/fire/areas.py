@@ -187,7 +187,7 @@ def parts_of_batch(request: Request, first: int, most: int) -> Iterator[tuple[in
 def refuse_starts(request: Request, shots: Shots, placements: Placements) -> None:
     """Refuse shots that begin inside a blocker, if their weapon does."""
     if request.blockers is not None and request.traits.inside == "error":
-        late.shelter.refuse_starts_inside(placements, shots, request.stack, request.blockers)
+        late.shelter.refuse_starts_inside(placements, shots, request.scene, request.stack, request.blockers)
 
 
 def _windows(placements: Placements, plan: Plan) -> PatternBits:

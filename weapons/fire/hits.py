@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from hitplanes.planes.bits.span_walk import Verdict
 from hitplanes.planes.common.backend import cached_attribute
-from hitplanes.planes.common.checks import Bools, InputError, Ints, integer
+from hitplanes.planes.common.checks import Bools, InputError, Ints, integer, shown
 from hitplanes.planes.common.limits import WEIGHT_FULL
 from hitplanes.planes.grid.spans import Spans
 from hitplanes.planes.scene.items import Stack
@@ -264,7 +264,11 @@ class Hits:
         if isinstance(row, slice):
             columns = [getattr(self, name)[row].tolist() for name in HitRow._fields]
             return [_named(values) for values in zip(*columns, strict=True)]
-        number = index(row)
+        try:
+            number = range(len(self))[index(row)]
+        except (TypeError, IndexError) as error:
+            said = f"hits: expected the number of one of {len(self)} rows, from 0, or a slice, got {shown(row)}"
+            raise type(error)(said) from None
         return _named(tuple(getattr(self, name)[number].tolist() for name in HitRow._fields))
 
     def __eq__(self, other: Any) -> bool:

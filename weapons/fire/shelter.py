@@ -129,11 +129,12 @@ def shelter_ranks(
     return np.where(several, ranks, shelter.ranks)
 
 
-def refuse_starts_inside(placements: Placements, shots: Shots, stack: Stack, blockers: Blockers) -> None:
+def refuse_starts_inside(placements: Placements, shots: Shots, scene: Scene, stack: Stack, blockers: Blockers) -> None:
     """Refuse shots of which the way to a pixel begins inside a blocker."""
     place, blocker = late.shadows.begun_in(placements.xy, blockers)
     shot, rank = placements.shot[place], blockers.rank[blocker]
     kept = np.flatnonzero(~refused(stack, rank, shots, shot))
     if len(kept):
         row, item = int(shots.row[shot[kept[0]]]), int(stack.ids[rank[kept[0]]])
-        raise InputError(f"at[{row}]: expected a start outside of every item that blocks, got one inside of id {item}")
+        got = f"one inside of id {item}, {scene.name_of(item)!r}"
+        raise InputError(f"at[{row}]: expected a start outside of every item that blocks, got {got}")

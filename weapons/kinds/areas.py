@@ -143,7 +143,9 @@ class Ring(AreaWeapon):
         """Check that the inner radius is not the larger one."""
         super().__post_init__()
         if self.inner_radius > self.outer_radius:
-            raise InputError(f"inner_radius: expected at most {self.outer_radius}, got {self.inner_radius}")
+            raise InputError(
+                f"inner_radius: expected at most outer_radius, {self.outer_radius}, got {self.inner_radius}"
+            )
 
     @property
     def reach_256(self) -> int:

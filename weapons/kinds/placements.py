@@ -336,7 +336,10 @@ def places_256(field: str, at: object) -> tuple[Ints, bool]:
     place = one_place(at)
     if place is not None:
         return np.array((place,), np.int64), True
-    single = array_of(field, at).shape == (2,)
+    given = array_of(field, at)
+    if given.ndim == 1 and given.dtype.kind in "iuf" and len(given) not in (0, 2):
+        raise InputError(f"{field}: expected shape (2,) or (any, 2), got {given.shape}")
+    single = given.shape == (2,)
     return snap(reals(field, at, (2,) if single else (None, 2), POSITION_MAX)).reshape(-1, 2), single
 
 

@@ -95,7 +95,7 @@ class Ready(Generic[AnyHits]):
     def fire(
         self, at: Places, aim: Angles | None = None, toward: Places | None = None, shot: Wholes | None = None
     ) -> AnyHits:
-        """Decide what one shot hits; the arguments are those of `fire`."""
+        """Decide what one shot hits; all other arguments of `fire`, such as `accept`, are given to `prepare`."""
         kept = self._filter
         exclude = [kept.exclude] if kept.exclude else None  # one row for all shots
         filters = accepted_of(kept.meets), blocking_of(kept.meets), exclude
@@ -211,7 +211,7 @@ class ReadyPattern(Ready[Hits]):
         return ReadyPattern(self.scene, self.weapon, kept, self._reach, self._aims_by)
 
     def fire(self, at: Any, aim: object = None, toward: object = None, shot: object = None) -> Hits:
-        """Decide what one shot hits; the arguments are those of `fire`."""
+        """Decide what one shot hits; all other arguments of `fire`, such as `accept`, are given to `prepare`."""
         if self._items.version != self._version:
             self._follow()
         try:

@@ -261,24 +261,25 @@ def _touched(
     met = find_contacts(own, row, rank, stack, through.bounds, origin)
     plan.run("walk", "cells of rays on pixels of items", met.nbytes)
     if not isinstance(ray, Projectile):
-        return _started(met, rays, ray, shots, stack)
+        return _started(met, rays, ray, shots, through)
     moving = is_moving(ray, through.items, stack)
     own = relative_lines(lines, ray, met.ray, stack.rows[met.rank], through.items)
-    met = _started(in_frame(met, own, moving), rays, ray, shots, stack)
+    met = _started(in_frame(met, own, moving), rays, ray, shots, through)
     if ray.steps is None:
         return met
     return at_steps(met, relative_lines(lines, ray, met.ray, stack.rows[met.rank], through.items), ray.steps)
 
 
-def _started(met: Contacts, rays: Rays, ray: RayWeapon, shots: Shots, stack: Stack) -> Contacts:
+def _started(met: Contacts, rays: Rays, ray: RayWeapon, shots: Shots, through: Range) -> Contacts:
     """Apply the weapon's rule to items in which rays start."""
     if ray.inside == "hit" or not len(met):
         return met
     inside = np.flatnonzero(met.entry[met.first] == 0)
     if ray.inside == "error" and len(inside):
         pair = inside[np.lexsort((met.rank[inside], met.ray[inside]))[0]]
-        shot, item = int(shots.row[rays.shot[met.ray[pair]]]), int(stack.ids[met.rank[pair]])
-        raise InputError(f"at[{shot}]: expected a start outside of every item, got one inside of id {item}")
+        shot, item = int(shots.row[rays.shot[met.ray[pair]]]), int(through.stack.ids[met.rank[pair]])
+        got = f"one inside of id {item}, {through.items.name_of(item)!r}"
+        raise InputError(f"at[{shot}]: expected a start outside of every item, got {got}")
     out = np.full(len(met), -1)
     if len(inside):
         pair, first, last = stretches(met.pair, met.entry, met.leave)
