@@ -37,7 +37,7 @@ from hitplanes import (
 )
 from hitplanes.planes.common.backend import kernels_of
 from hitplanes.planes.grid.fixed_point import unit, unit_of
-from hitplanes.weapons.prepared.prepared_ray import OneRay, ReadyRay
+from hitplanes.weapons.prepared.prepared_ray import OneShotOfRays, ReadyRay, ReadySpread
 from hitplanes.weapons.rays import one_ray, raycast
 from hitplanes.weapons.rays.contacts import NEVER
 from hitplanes.weapons.rays.one_ray import Ray, WideRay
@@ -111,11 +111,48 @@ def test_a_crowd(kernels: ModuleType, weapon: Weapon, exclude: object, bounded: 
             at = tuple((rng.integers(-60 * 256, 300 * 256, 2) / 256).tolist())
             shot = [{}, {"aim": float(rng.uniform(-720, 720))}, {"toward": (100, 60.5)}, {"aim": 45, "shot": 9}][k % 4]
             got = ready.fire(at, **shot)
-            alone += type(got) is OneRay
+            alone += type(got) is OneShotOfRays
             same(got, fire(scene, weapon, at, exclude=exclude, strategy="walk", **shot))
             rows += len(got)
         scene.move(scene.ids()[step::5], rng.uniform((0, 0), (220, 160), (8, 2)))
     assert 12 < rows < (72 if weapon.hits_most == 1 else 300) and alone > 60  # type: ignore[attr-defined]
+
+
+SPREADS: list[Weapon] = [
+    Spread(Pistol(150), 8, 9), Spread(Pistol(90, falloff="linear"), 32, 14), Spread(Pistol(120, width=5), 5, 6),
+    Spread(Rifle(120, max_hits=1), 3, 0.5), Spread(Pistol(90, inside="ignore_until_exit"), 4, 8),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("weapon", some_of(SPREADS, 2), ids=repr)
+@pytest.mark.parametrize("bounded", [True, False])
+def test_a_spread_of_a_few_rays(kernels: ModuleType, weapon: Weapon, bounded: bool) -> None:
+    """Pellets that hit the same object are one row, that of the nearest; so is a pixel that several of them hit."""
+    scene, rng = crowd(7, (220, 160) if bounded else None), np.random.default_rng(3)
+    ready, rows, alone = prepare(scene, weapon, exclude=[1, 4], seed=3), 0, 0
+    assert type(ready) is ReadySpread
+    for step in range(3):
+        for k in range(24):
+            at = tuple((rng.integers(-20 * 256, 240 * 256, 2) / 256).tolist())
+            shot = [{}, {"aim": float(rng.uniform(-720, 720))}, {"toward": (100, 60.5)}, {"aim": 45, "shot": k}][k % 4]
+            got = ready.fire(at, **shot)
+            alone += type(got) is OneShotOfRays
+            truth = fire(scene, weapon, at, exclude=[1, 4], seed=3, strategy="walk", **shot)
+            same(got, truth)
+            assert got.rays == truth.rays and got.passes == truth.passes and got.stop == truth.stop
+            rows += sum(row.pellets > 1 for row in got)
+        scene.move(scene.ids()[step::5], rng.uniform((0, 0), (220, 160), (8, 2)))
+    assert rows > 10 and alone > 40
+
+
+@pytest.mark.parametrize("weapon", [Spread(Pistol(9), 8, 2), Spread(Pistol(9, falloff="linear"), 8, 2)], ids=str)
+def test_a_pixel_that_several_pellets_hit_counts_once(kernels: ModuleType, weapon: Weapon) -> None:
+    scene = Scene()
+    wall = scene.add(np.ones((9, 1), np.bool_), (4, 0))
+    shot, truth = prepare(scene, weapon).fire((0, 0)), fire(scene, weapon, (0, 0), strategy="walk")
+    (row,) = shot
+    assert row == (0, 0, wall, 8, row.pixels, row.weight, 8, (4, 0), 16) and row.pixels < 8
+    same(shot, truth)
 
 
 THROUGH = [
@@ -135,7 +172,7 @@ def test_a_budget_that_just_lasts_and_one_that_does_not(kernels: ModuleType, aim
     for budget in np.arange(4, 34, 0.5).tolist():
         weapon = Rifle(90, budget=budget)
         hits = prepare(scene, weapon).fire((0, 0), aim)
-        assert type(hits) is OneRay
+        assert type(hits) is OneShotOfRays
         same(hits, fire(scene, weapon, (0, 0), aim=aim, strategy="walk"))
         seen.add(len(hits))
     assert seen == {1, 2, 3}
@@ -277,7 +314,7 @@ def test_what_is_asked_of_a_ray(kernels: ModuleType, weapon: Weapon) -> None:
     ready = prepare(scene, weapon, exclude=3)
     for aim in range(0, 360, 60):
         got, truth = ready.fire(AT, aim=aim), fire(scene, weapon, AT, aim=aim, exclude=3, strategy="walk")
-        assert isinstance(got, OneRay) and isinstance(truth, RayHits)
+        assert isinstance(got, OneShotOfRays) and isinstance(truth, RayHits)
         assert got.passes == truth.passes and got.stop == truth.stop and got.rays == truth.rays == 1
         assert got.by_owner() == truth.by_owner()
         assert got.why_not() == truth.why_not() and got.nearest_miss() == truth.nearest_miss()
@@ -337,7 +374,7 @@ def test_positions_of_any_kind(kernels: ModuleType, at: object) -> None:
 
 @pytest.mark.parametrize("weapon", [
     Projectile(90, 3, steps=4), Projectile(0, 9),
-    Rounds(Pistol(90), 2), Spread(Pistol(90), 3, 4),
+    Rounds(Pistol(90), 2), Spread(Laser(90), 3, 4), Spread(Pistol(90), 33, 4), Rounds(Spread(Pistol(90), 3, 4), 2),
 ], ids=repr)  # fmt: skip
 def test_other_weapons_of_rays_go_the_way_of_fire(weapon: Weapon) -> None:
     scene = crowd(3)
@@ -354,7 +391,7 @@ def test_a_projectile_among_items_that_begin_to_move(kernels: ModuleType) -> Non
         scene.set(scene.ids(), velocity_xy=velocity)
         for aim in range(0, 360, 45):
             got = ready.fire(AT, aim=aim)
-            assert type(got) is OneRay if alone else type(got) is RayHits
+            assert type(got) is OneShotOfRays if alone else type(got) is RayHits
             same(got, fire(scene, weapon, AT, aim=aim, strategy="walk"))
 
 

@@ -164,20 +164,20 @@ def one_taken(
 
     Off the plane the ray jumps by its distance from the plane.
     """
-    if not any(step) or max(map(abs, step)) > LONGEST:
+    (height, width), back_x, back_y = shape, step[0] < 0, step[1] < 0
+    dx, dy = abs(step[0]), abs(step[1])
+    if dx == 0 == dy or dx > LONGEST or dy > LONGEST:
         return UNDECIDED, 0, False
-    (height, width), (dx, dy), (back_x, back_y) = shape, map(abs, step), (v < 0 for v in step)
     x, y = (start[0] + HALF - back_x) >> 8, (start[1] + HALF - back_y) >> 8
     sx, sy = 1 - 2 * back_x, 1 - 2 * back_y
     ax, ay = sx * (start[0] - SUB * x), sy * (start[1] - SUB * y)
     last_x, last_y = (dx + ax + HALF) >> 8, (dy + ay + HALF) >> 8
-    if any(max(v, v + s * e) < 1 or min(v, v + s * e) > size - 2 for v, s, e, size in (
-        (x, sx, last_x, width), (y, sy, last_y, height)
-    )):  # fmt: skip
+    if _is_beside(x, x + sx * last_x, width) or _is_beside(y, y + sy * last_y, height):
         return NOTHING, 0, False
     level, upright = dy == 0 and ay == -HALF, dx == 0 and ax == -HALF
     a, b, c = SUB * dx, SUB * (dx + dy), 0 if level else dx * (HALF - ay) + dy * (HALF + ax)
     aside = width if level else 1 if upright else sx - sy * width
+    back = sx * (ax == -HALF), sy * width * (ay == -HALF)
     n = looks = 0
     while n <= last_x + last_y:
         looks += 1
@@ -185,16 +185,23 @@ def one_taken(
             return UNDECIDED, 0, False
         i, rest = divmod(a * n + c, b)
         u, v = x + sx * i, y + sy * (n - i)
-        off = max(1 - u, u - width + 2, 0) + max(1 - v, v - height + 2, 0)
+        off = 0
+        if not (0 < u < width - 1 and 0 < v < height - 1):
+            off = max(1 - u, u - width + 2, 0) + max(1 - v, v - height + 2, 0)
         cell = v * width + u
         jump = off or (flat[cell] if rest else min(flat[cell], flat[cell - aside]))
-        if not n and not off and _starts_beside(flat, cell, (sx * (ax == -HALF), sy * width * (ay == -HALF))):
+        if not n and not off and back != (0, 0) and _starts_beside(flat, cell, back):
             return 0, cell, True
         if not jump:
             times = (SUB * i - HALF - ax) * max(dy, 1), (SUB * (n - i) - HALF - ay) * max(dx, 1)
             return max(*times, 0), cell, not rest
         n += jump
     return NOTHING, 0, False
+
+
+def _is_beside(first: int, last: int, size: int) -> bool:
+    """Whether cells from the first to the last, along one axis, lie off the plane."""
+    return (first < 1 and last < 1) or (first > size - 2 and last > size - 2)
 
 
 def _starts_beside(flat: memoryview, cell: int, back: tuple[int, int]) -> bool:

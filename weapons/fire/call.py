@@ -17,7 +17,7 @@ from hitplanes.planes.common.limits import ALL
 from hitplanes.planes.scene.scene import Scene
 
 from .. import late
-from ..kinds.areas import Rays, ray_parts_of
+from ..kinds.areas import Rays, are_followed, ray_parts_of
 from ..kinds.placements import OWNER_MAX, Shots, checked_shots
 from ..kinds.weapon import Weapon
 from .areas import Request, leave_out_unused, traits_of
@@ -66,9 +66,6 @@ How = tuple[str, str, str]
 
 ONE_AIM = int | float | np.number | None
 """Types of the aim of one shot; several aims have one position, and their filters are those of several shots."""
-
-ONE_RAY = None, None
-"""No burst and no spread: the parts of a weapon each shot of which is one ray."""
 
 OWNERS_READY = 16
 """Most owners that a filter which is kept excludes."""
@@ -201,8 +198,8 @@ def ready_for(scene: Scene | History, weapon: Weapon, filters: Filtering) -> Rea
     if type(scene) is not Scene or not isinstance(weapon, Weapon):
         return None
     parts = ray_parts_of(weapon)
-    if parts is not None and parts[:2] != ONE_RAY:
-        return None  # `prepare` leaves several rays to `fire`
+    if parts is not None and not are_followed(parts):
+        return None  # `prepare` leaves other rays to `fire`
     accepts: Any = category_bits(scene, "accept", accept)
     blocks: Any = category_bits(scene, "blocked_by", blocked_by)
     owners = _plain_owners(exclude)
@@ -230,9 +227,9 @@ def _plain_owners(exclude: Any) -> tuple[int, ...] | None:
 
 
 def _ready_then(scene: Scene | History, weapon: Weapon, filters: Filtering, tick: object) -> Ready[Hits] | None:
-    """A weapon of one ray, ready for the scene of a tick; it pays for a single shot, for which nothing is kept."""
+    """A weapon of few rays, ready for the scene of a tick; it pays for a single shot, for which nothing is kept."""
     parts = ray_parts_of(weapon) if isinstance(tick, int | float) else None
-    if parts is None or parts[:2] != ONE_RAY or present_of(scene) is scene:
+    if parts is None or not are_followed(parts) or present_of(scene) is scene:
         return None
     ((past, _),) = moments_of(scene, tick, 1)
     accept, blocked_by, exclude, seed = filters

@@ -280,7 +280,7 @@ def _cast_or_march(ray: RayWeapon, scene: Scene, view: View | None, rays: int, p
     """Of rays that can be cast, whether they march; `why` tells what was passed over."""
     now, stack = costs(), scene.items.stack()
     cast = _alone_ns(rays, stack) if prepared else _cast_ns(rays, stack)
-    march = now.prepared_march if prepared else now.march_call + rays * now.march_ray
+    march = rays * now.prepared_march if prepared else now.march_call + rays * now.march_ray
     why += f"about {cast / 1e3:.0f} us cast at items"
     field = scene.derived.distance_field(view) if is_thin_first(ray) and view is not None else None
     if field is None:

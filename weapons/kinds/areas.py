@@ -23,7 +23,7 @@ from hitplanes.planes.scene.scene import Scene
 from hitplanes.planes.scene.sprite import Sprite, fits, frame_pivot, rows_of
 from hitplanes.planes.scene.variants import Transform, variant_of
 
-from .rays import INSIDE, Laser, Pistol, Projectile, RayWeapon, Rifle, Sweep
+from .rays import INSIDE, Laser, Pistol, Projectile, RayWeapon, Rifle, Sweep, ends_at_first, is_stepped
 from .weapon import (
     FALLOFFS,
     LENGTH,
@@ -38,6 +38,9 @@ from .weapon import (
 )
 
 SIGHTS = ("occluders", "all")
+
+FOLLOWED_MOST = 32
+"""Most rays of a shot that a ready weapon follows one by one; more take less time together."""
 ORIGIN, ONE_RING = np.zeros(2, np.int64), np.zeros(1, np.int64)
 RING = Numbers((None, 2), REACH_MAX / 2, least=3)
 
@@ -418,6 +421,14 @@ def parts_of(weapon: Weapon) -> tuple[Rounds[Any] | None, Spread[Any] | None, Ar
 def ray_parts_of(weapon: Weapon) -> tuple[Rounds[Any] | None, Spread[Any] | Sweep | None, RayWeapon] | None:
     """Burst, spread or sweep, and ray of a ray weapon; None for other weapons."""
     return _parts_of(weapon)[1]
+
+
+def are_followed(parts: tuple[Rounds[Any] | None, Spread[Any] | Sweep | None, RayWeapon]) -> bool:
+    """Whether a ready shot follows its rays one by one: one ray, or a few of a spread that end at their first hit."""
+    burst, several, ray = parts
+    if burst is not None or is_stepped(ray):
+        return False
+    return several is None or (isinstance(several, Spread) and several.count <= FOLLOWED_MOST and ends_at_first(ray))
 
 
 def _parts_of(weapon: object) -> Parts:

@@ -20,9 +20,8 @@ from hitplanes.planes.scene.scene import Scene
 
 from ..fire.call import category_bits, check_owners, fire_anew
 from ..fire.hits import Hits
-from ..kinds.areas import Rays, parts_of, ray_parts_of
+from ..kinds.areas import Rays, Spread, are_followed, parts_of, ray_parts_of
 from ..kinds.placements import accepted_of, blocking_of, checked_filter, checked_owners, checked_seeds
-from ..kinds.rays import is_stepped
 from ..kinds.weapon import Weapon
 from . import position_cache
 from .one_shot import Arguments, Filter, OneShot, Present, reach_of, rounds_of
@@ -68,9 +67,10 @@ class Ready(Generic[AnyHits]):
     Every shot compares versions. If the scene has changed, all that was looked up is discarded first, so that no answer
     is of an older scene. The choice between numpy and compiled kernels is made at the same time.
 
-    Patterns of up to 1000 px are looked up; weapons of one ray are cast (see `prepared_ray`). These are left to `fire`:
+    Patterns of up to 1000 px are looked up; weapons of one ray are cast, and spreads of a few rays that end at their
+    first hit (see `prepared_ray`). These are left to `fire`:
 
-    - sweeps, spreads and bursts of rays, and rays that must walk (see `prepared_ray`)
+    - sweeps, bursts and other spreads of rays, and rays that must walk (see `prepared_ray`)
     - weapons with a line of sight; spreads with a falloff, of many or far pellets, and bursts of spreads
     - larger patterns, and in numpy large patterns near which there are many items
     - bursts whose recoil is not a whole number of pixels
@@ -326,10 +326,14 @@ def prepare(
     kept = _filter_of(scene, accept, blocked_by, exclude, seed)
     parts = ray_parts_of(weapon)
     if parts is not None:
-        from .prepared_ray import ReadyRay
+        if not are_followed(parts):
+            return Ready(scene, weapon, kept)
+        from .prepared_ray import ReadyRay, ReadySpread
 
-        alone = parts[0] is None and parts[1] is None and not is_stepped(parts[2])
-        return ReadyRay(scene, weapon, kept, parts[2]) if alone else Ready(scene, weapon, kept)
+        _, several, ray = parts
+        if isinstance(several, Spread):
+            return ReadySpread(scene, weapon, kept, ray, several)
+        return ReadyRay(scene, weapon, kept, ray)
     reach = reach_of(weapon)
     return Ready(scene, weapon, kept) if reach is None else ReadyPattern(scene, weapon, kept, reach)
 

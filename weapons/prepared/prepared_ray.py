@@ -1,18 +1,19 @@
-"""A prepared weapon of one ray: each shot is cast at the items, or marches to its first hit.
+"""A prepared weapon of one ray, or of a few: each is cast at the items, or marches to its first hit.
 
 The way is chosen as `fire` chooses it (see `fire.strategy`). A ray that marches is cast if it comes to several pixels
 at once.
 
-position, aim -> start and step, 1/256 px -> what the ray hits -> a row for each object
+position, aim -> start and step, 1/256 px -> what each ray hits -> a row for each object
 """
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 
+from hitplanes.planes.bits.bit_rows import row_order
 from hitplanes.planes.common.backend import cached_attribute, kernels_of
 from hitplanes.planes.common.checks import Ints
 from hitplanes.planes.common.limits import HALF, POSITION_MAX, REACH_MAX, SUB, WEIGHT_FULL
@@ -24,13 +25,12 @@ from hitplanes.planes.scene.scene import Scene
 from .. import late
 from ..fire.hits import HitRow
 from ..fire.prefilter import filters_of
-from ..kinds.areas import ray_parts_of
-from ..kinds.placements import STRAIGHT, ZEROS
-from ..kinds.rays import RayWeapon, ends_at_first, unspent
+from ..kinds.areas import Spread
+from ..kinds.placements import STRAIGHT, ZEROS, pellets_of
+from ..kinds.rays import RayWeapon, unspent
 from ..kinds.weapon import Weapon
 from ..rays import raycast
-from ..rays.contacts import NEVER, Rays, Reason, Terminations, Touches, endless
-from ..rays.first_hit import FirstHits
+from ..rays.contacts import NEVER, Rays, Touches, endless, rays_of
 from ..rays.one_ray import Follow, Followed, chosen_follower
 from ..rays.ray_hits import Later, RayHits, Walk, weights_at
 from ..rays.ray_walk import lines_of
@@ -40,51 +40,33 @@ from .prepare import PLAIN, Ready, plain_number, plain_pair
 
 Pair = tuple[float, float]
 
-Line = tuple[tuple[int, int], tuple[int, int]]
-"""Start of a ray, and the vector from there to its end, 1/256 px."""
+Vector = tuple[int, int]
+"""Start of a ray, or the vector from there to its end, 1/256 px."""
+
+NUMBERS_KEPT = 256  # shot numbers whose pellets a weapon keeps
 
 ENTRY = 4
 """Place in a row of `Followed` of the time at which the ray enters the object."""
 
 
-def ray_along(start: tuple[int, int], step: tuple[int, int]) -> Rays:
+def ray_along(start: Vector, step: Vector) -> Rays:
     """The ray of the first shot along a line, 1/256 px."""
     start_256, zero = np.array([start]), ZEROS[:1]
     return Rays(start_256, np.array([step]), pixel(start_256), shot=zero, round=zero, pellet=zero)
 
 
-def _first_end(rays: Rays, met: list[list[int]]) -> Terminations:
-    """The end of one ray in the object that it hits, or at its range; `met` is that of `Followed`."""
-    ends = endless(1)
-    if met:
-        (rank, _, x, y, entry), (left, top) = met[0], rays.origin_xy[0].tolist()
-        ends.reason[0], ends.rank[0], ends.time[0] = Reason.HITS, rank, entry
-        ends.x[0], ends.y[0] = x - left, y - top
-    return ends
-
-
-class OneRay(OneShot, RayHits):
-    """Answer of one prepared ray: a list of its rows; all else is made when it is asked for."""
-
-    __slots__ = ("_arguments", "_followed", "_line")  # set at each shot
-
-    _line: Line
-    _followed: Followed
+class OneShotOfRays(OneShot, RayHits):
+    """Answer of one shot of a prepared ray weapon: a list of its rows; all else is made when it is asked for."""
 
     @cached_attribute
     def _weighted(self) -> bool:
-        parts = ray_parts_of(self.weapon)
-        return parts is not None and parts[2].fades is not None
+        return self._parts[2].fades is not None
 
     @cached_property
-    def _ended(self) -> Walk | FirstHits:
-        """The ray as a batch of one. Unless its end is known, it is followed anew in the snapshot of the scene."""
-        parts, stack, bounds = ray_parts_of(self.weapon), self._present.stack, self._present.bounds
-        assert parts is not None  # it was prepared as one
-        rays, ray = ray_along(*self._line), parts[2]
-        time, met = self._followed
-        if ends_at_first(ray) and (met or time == NEVER):
-            return FirstHits(rays, ray, _first_end(rays, met), stack)
+    def _ended(self) -> Walk:
+        """The rays as a batch, followed anew in the snapshot of the scene."""
+        parts, stack, bounds = self._parts, self._present.stack, self._present.bounds
+        rays, ray = rays_of(parts, self.shots), parts[2]
         lines = Lines(rays.start_256, rays.step_256, ray.radius_256)
         filters = filters_of(stack, self._present.filter.shot_at_origin(None, 0), rays.shot)
         cast = stack, bounds, lines, ray.hits_most, filters
@@ -104,9 +86,13 @@ class OneRay(OneShot, RayHits):
 class ReadyRay(Ready[RayHits]):
     """Prepared weapon of one ray that can be cast.
 
+    `rays` is their number in a shot.
+
     These are left to `fire`: bad input, projectiles while items move, a budget of 0, and a ray that starts inside an
     item if its weapon does not hit that item.
     """
+
+    rays = 1
 
     def __init__(self, scene: Scene, weapon: Weapon, kept: Filter, ray: RayWeapon) -> None:
         super().__init__(scene, weapon, kept)
@@ -114,7 +100,7 @@ class ReadyRay(Ready[RayHits]):
         self._cast, self._budget_256 = unspent(ray), ray.budget_256
         self._arrangement = -1
         self._stack: Stack
-        self._follows: Follow
+        self._follows: Follow | None
         self._present: Present
         self._ids: memoryview
 
@@ -131,13 +117,17 @@ class ReadyRay(Ready[RayHits]):
         step = self._step(place, angle, target) if place and numbered and (target or toward is None) else None
         if place is None or step is None:
             return Ready.fire(self, at, aim, toward, shot)
-        start = round(SUB * place[0]), round(SUB * place[1])
-        followed = self._follows(*start, *step)
-        if followed is None or self._must_walk(*followed):
-            return Ready.fire(self, at, aim, toward, shot)
-        hits: OneRay = OneRay()
+        hits: OneShotOfRays = OneShotOfRays()
         hits._present, hits._at, hits._arguments = self._present, place, (angle, target, number)
-        hits._line, hits._followed = (start, step), followed
+        if self._answered(hits, (round(SUB * place[0]), round(SUB * place[1])), step):
+            return hits
+        return Ready.fire(self, at, aim, toward, shot)
+
+    def _answered(self, hits: OneShotOfRays, start: Vector, step: Vector) -> bool:
+        """Add the rows of a shot to its answer; False if it is left to `fire`."""
+        followed = (self._follows or self._chosen())(*start, *step)
+        if followed is None or self._must_walk(*followed):
+            return False
         found = followed[1]
         if self._budget_256 and self._may_spend(found, self._budget_256):
             found = self._before_spent(start, step, self._budget_256, followed)
@@ -146,7 +136,7 @@ class ReadyRay(Ready[RayHits]):
             weight = WEIGHT_FULL if self._fades is None else self._weight(step, entry)
             columns = 0, 0, self._ids[rank], count, count, weight, 1, (x, y), column * column + row * row
             hits.append(new(HitRow, columns))
-        return hits
+        return True
 
     def _must_walk(self, end: int, found: list[list[int]]) -> bool:
         """Whether a ray that was cast to its end begins in an item that is not hit, or with a budget of 0."""
@@ -160,9 +150,7 @@ class ReadyRay(Ready[RayHits]):
         cells = sum(cost.item(rank) * count for rank, count, *_ in found)
         return cells * raycast.longest_in_cell(self._ray.radius_256) >= budget_256
 
-    def _before_spent(
-        self, start: tuple[int, int], step: tuple[int, int], budget_256: int, followed: Followed
-    ) -> list[list[int]]:
+    def _before_spent(self, start: Vector, step: Vector, budget_256: int, followed: Followed) -> list[list[int]]:
         """What a ray hits before its budget is used up, of what it hits without one."""
         cost, ends, rays = self._present.cost, endless(1), ray_along(start, step)
         assert cost is not None  # its weapon has a budget
@@ -182,15 +170,16 @@ class ReadyRay(Ready[RayHits]):
         step = self._step(place, None, goal) if place and goal else None
         if place is None or step is None:
             return None
-        followed = self._follows(round(SUB * place[0]), round(SUB * place[1]), *step)
+        follow = self._follows or self._chosen()
+        followed = follow(round(SUB * place[0]), round(SUB * place[1]), *step)
         return None if followed is None else followed[0] == NEVER
 
-    def _unsettled(self, x: int, y: int, dx: int, dy: int) -> Followed | None:
-        """What a ray hits, by the way chosen now; the next rays go the same way unless it is pending."""
-        follow, pending = chosen_follower(self.scene, self._stack, self._cast, self._view)
+    def _chosen(self) -> Follow:
+        """How a shot's rays are followed; the next ones are followed alike unless a better way may pay soon."""
+        follow, pending = chosen_follower(self.scene, self._stack, self._cast, self._view, self.rays)
         if not pending:
             self._follows = follow
-        return follow(x, y, dx, dy)
+        return follow
 
     def _step(self, place: Pair, aim: Any, target: Pair | None) -> tuple[int, int] | None:
         """Vector from the start of a shot to its end, 1/256 px; None if an argument must be checked by `fire`."""
@@ -216,6 +205,55 @@ class ReadyRay(Ready[RayHits]):
         if stack.arrangement != self._arrangement:
             self._arrangement = stack.arrangement
             self._ids = stack.ids.data
-        self._follows = self._unsettled
+        self._follows = None
         cost = None if self._budget_256 is None else self.scene.items.cost[stack.rows]
         self._present = self._snapshot(version, stack, cost=cost)
+
+
+class ReadySpread(ReadyRay):
+    """Prepared spread of a few rays that end at their first hit; see `ReadyRay` for what is left to `fire`."""
+
+    def __init__(self, scene: Scene, weapon: Weapon, kept: Filter, ray: RayWeapon, spread: Spread[Any]) -> None:
+        super().__init__(scene, weapon, kept, ray)
+        self.rays, self._spread, self._offsets = spread.count, spread, lru_cache(NUMBERS_KEPT)(self._drawn)
+
+    def _with(self, kept: Filter) -> ReadySpread:
+        return ReadySpread(self.scene, self.weapon, kept, self._ray, self._spread)
+
+    def _drawn(self, number: int) -> list[Vector]:
+        """Offsets of the pellets of a shot number, 1/256 px."""
+        seed, zero = np.array([self._filter.seed], np.uint64), ZEROS[:1]
+        return [(SUB * x, SUB * y) for x, y in pellets_of(self._spread, seed, np.array([number]), zero)[0].tolist()]
+
+    def _answered(self, hits: OneShotOfRays, start: Vector, step: Vector) -> bool:
+        """Add the rows of a shot to its answer, those of the nearest hit first; False if it is left to `fire`."""
+        follow, ends, met = self._follows or self._chosen(), [], []
+        for dx, dy in self._offsets(hits._arguments[2] or 0):
+            end = step[0] + dx, step[1] + dy
+            followed = follow(*start, *end)
+            if followed is None or self._must_walk(*followed):
+                return False
+            if followed[1]:
+                ends.append(end)
+                met += followed[1]
+        hits.rays = self.rays
+        if met:
+            self._add_rows(hits, start, np.array(ends), met)
+        return True
+
+    def _add_rows(self, hits: OneShotOfRays, start: Vector, steps: Ints, met: list[list[int]]) -> None:
+        """Add rows of what rays (k,) along steps (k, 2) hit first; `met` is that of `Followed`."""
+        lines = Lines(np.zeros_like(steps), steps, self._ray.radius_256)
+        entry = np.array([time for *_, time in met])
+        weights = weights_at(entry, lines.scale, self._fades).tolist()
+        rows: dict[int, list[Any]] = {}
+        for k in row_order(entry / lines.scale * lines.length).tolist():
+            rank, _, x, y, _ = met[k]
+            row = rows.setdefault(rank, [(x, y), set(), 0, 0])
+            row[1].add((x, y))
+            row[2] += 1
+            row[3] += weights[k]
+        for rank, ((x, y), pixels, pellets, weight) in rows.items():
+            column, line = x - ((start[0] + HALF) >> 8), y - ((start[1] + HALF) >> 8)
+            of_pixels = pellets, len(pixels), weight, pellets, (x, y), column * column + line * line
+            hits.append(new(HitRow, (0, 0, self._ids[rank], *of_pixels)))

@@ -81,14 +81,14 @@ Follow = Callable[[int, int, int, int], Followed | None]
 
 
 def chosen_follower(
-    scene: Scene, stack: Stack, ray: RayWeapon, view: View, in_arrays: bool = True
+    scene: Scene, stack: Stack, ray: RayWeapon, view: View, rays: int = 1, in_arrays: bool = True
 ) -> tuple[Follow, bool]:
-    """Function that follows one ray by the way chosen now, and whether the next ray may go another way.
+    """Function that follows each of so many rays by the way chosen now, and whether the next may go another way.
 
     A ray is cast if it comes to several pixels at once by march. One that passes too many rows of masks is cast in
     arrays, or None is returned of it if `in_arrays` is False, as of rays that must walk.
     """
-    chosen = chosen_ray_way("auto", False, ray, scene, stack, view, 1, prepared=True)
+    chosen = chosen_ray_way("auto", False, ray, scene, stack, view, rays, prepared=True)
     bounds, radius, most = scene.bounds, ray.radius_256, ray.hits_most
     alone: Follow = kernels_of(sys.modules[__name__]).follower(stack, bounds, view, radius, most)
 

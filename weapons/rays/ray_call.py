@@ -122,7 +122,7 @@ def end_times(scene: Scene, ray: RayWeapon, view: View | None, count: int) -> Ca
     """
     stack, follow = scene.items.stack(), None
     if view is not None and are_faster_alone(count, stack):
-        follow, _ = late.one_ray.chosen_follower(scene, stack, ray, view, False)
+        follow, _ = late.one_ray.chosen_follower(scene, stack, ray, view, in_arrays=False)
     planned = cache(lambda: _planned(scene, ray, view, count, AUTO, Plan()))
 
     def ended(shots: Shots) -> tuple[Rays, Ints]:
