@@ -187,6 +187,18 @@ def test_verdicts_of_battles_are_those_of_the_cells(part: int, monkeypatch: pyte
     assert seen.all()
 
 
+@pytest.mark.parametrize("width", [1, 3, 9])
+@pytest.mark.usefixtures("jit")
+def test_cells_of_wide_rays_that_walls_end_are_those_of_the_list(width: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """At all angles, so that some have many cells in a row of pixels, which end before the wall, at it, or behind."""
+    scene, rng = Scene((160, 120)), np.random.default_rng(5)
+    for _ in range(9):
+        scene.add(np.ones((9, 9), np.bool_), rng.integers(0, (160, 120)), role="occluder")
+    for weapon in (Pistol(90, width=width), Projectile(70, width / 2)):
+        hits = fire(scene, weapon, rng.uniform(-9, (169, 129), (60, 2)), aim=np.arange(60) * 6.1)
+        assert told(monkeypatch, hits) == listed(hits) and 9 < hits.verdicts[:, Verdict.OCCLUDED].sum() < 60
+
+
 @pytest.mark.parametrize("width", [0, 1])
 @pytest.mark.usefixtures("jit")
 def test_an_object_behind_the_wall_that_stops_a_ray_is_not_hit_in_the_last_cell(width: float) -> None:

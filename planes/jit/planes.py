@@ -396,6 +396,32 @@ DOUBT = 1 << 18
 
 
 @helper()
+def entry_of(at_x, at_y, u, v, ray, wide):
+    """Time at which a ray enters a pixel, see `grid.rasterize.Lines.times`; LATE if it does not touch it.
+
+    Parameters
+    ----------
+    u, v : products of the ray with the vector from its start to the pixel, along it and across
+    """
+    x, y, _, _, across_x, across_y = ray
+    radius, side, _, length2 = wide
+    best, within = np.int64(LATE), (np.int64(0), np.int64(-1))
+    if radius < DIAGONAL:
+        within = times_in(at_x, at_y, at_x, at_y, ray)
+        if radius == 0:
+            return within[0] if within[0] <= within[1] else best
+    if abs(v) <= side and (length2 > 0 or (SUB * at_x - x) ** 2 + (SUB * at_y - y) ** 2 <= radius * radius):
+        root = half_chord(radius, v, length2)
+        if max(u - root, 0) <= min(u + root, length2):
+            best = max(u - root, 0)
+    if within[0] <= within[1]:
+        entry = -share(-within[0], length2, across_x * across_y)
+        if entry <= share(within[1], length2, across_x * across_y):
+            best = min(best, entry)
+    return best
+
+
+@helper()
 def _place(parts, unit):
     """A number of pixels, given in parts, rounded down to 2**-40."""
     whole = parts // unit

@@ -24,13 +24,11 @@ from .planes import (
     bounds_of_times,
     cells_by,
     cells_within,
-    half_chord,
+    entry_of,
     near_of,
     part_of,
     rows_between,
     run_of,
-    share,
-    times_in,
     wide_run_of,
 )
 
@@ -59,38 +57,12 @@ PART_PAIRS, RAY_PAIRS = 135_000, 2000
 
 
 @helper()
-def _entry_of(at_x, at_y, u, v, ray, wide):
-    """Time at which a ray enters a pixel, see `grid.rasterize.Lines.times`; LATE if it does not touch it.
-
-    Parameters
-    ----------
-    u, v : products of the ray with the vector from its start to the pixel, along it and across
-    """
-    x, y, _, _, across_x, across_y = ray
-    radius, side, _, length2 = wide
-    best, within = np.int64(LATE), (np.int64(0), np.int64(-1))
-    if radius < DIAGONAL:
-        within = times_in(at_x, at_y, at_x, at_y, ray)
-        if radius == 0:
-            return within[0] if within[0] <= within[1] else best
-    if abs(v) <= side and (length2 > 0 or (SUB * at_x - x) ** 2 + (SUB * at_y - y) ** 2 <= radius * radius):
-        root = half_chord(radius, v, length2)
-        if max(u - root, 0) <= min(u + root, length2):
-            best = max(u - root, 0)
-    if within[0] <= within[1]:
-        entry = -share(-within[0], length2, across_x * across_y)
-        if entry <= share(within[1], length2, across_x * across_y):
-            best = min(best, entry)
-    return best
-
-
-@helper()
 def _walked(at_x, at_y, u, v, ray, wide, stop):
     """Whether a ray enters a pixel before its stop, and when."""
     time, stop_x, stop_y, alone, takes = stop
     if wide[0] > 0 and u - wide[2] - 2 > time:
         return False, np.int64(LATE)
-    entry = _entry_of(at_x, at_y, u, v, ray, wide)
+    entry = entry_of(at_x, at_y, u, v, ray, wide)
     if entry < time or entry == LATE:
         return entry < time, entry
     here = takes and at_x == stop_x and at_y == stop_y
@@ -388,20 +360,26 @@ def _row_cells(row, first, last, ray, wide, stop):
     px, py, end = SUB * left - x, SUB * top - y, min(stop[0], length2)
     u, v = px * dx + py * dy, px * dy - py * dx
     along, aside = (SUB * dy, -SUB * dx) if steep else (SUB * dx, SUB * dy)
-    near, far, begin, until, count = 0, cells - 1, cells, cells - 1, 0
+    least, most = min(u, u + (cells - 1) * along), max(u, u + (cells - 1) * along)
+    if cells < 1 or least > end + reach + 2 or most < -reach - 2:
+        return 0
+    sure = radius >= DIAGONAL and along != 0
+    if sure and least >= 0 and most < end and max(abs(v), abs(v + (cells - 1) * aside)) <= side:
+        return cells
+    near, far, begin, until = 0, cells - 1, cells, cells - 1
     if along != 0:
         near, far = between(u, along, cells, -reach - 2, end + reach + 2)
-    if along != 0 and radius >= DIAGONAL:
+    if sure:
         begin, until = between(u, along, cells, 0, end - 1)
         while begin <= until and abs(v + aside * begin) > side:
             begin += 1
         while begin <= until and abs(v + aside * until) > side:
             until -= 1
-        count = max(until - begin + 1, 0)
-    for k in range(near, far + 1):
-        if not (count and begin <= k <= until):
-            at_u, at_v = u + k * along, v + k * aside
-            count += _walked(left + k * (not steep), top + k * steep, at_u, at_v, ray, wide, stop)[0]
+    count = surely = max(until - begin + 1, 0)
+    for place in range(near, far + 1 - surely):
+        k = place if place < begin or surely == 0 else place + surely
+        at_u, at_v = u + k * along, v + k * aside
+        count += _walked(left + k * (not steep), top + k * steep, at_u, at_v, ray, wide, stop)[0]
     return count
 
 
@@ -424,7 +402,10 @@ def _wide_cells(ray, wide, bounds, stop):
             first, last = max(first, u_least), min(last, u_most) if v_least <= row <= v_most else first - 1
             count = _row_cells(row, first, last, ray, wide, endless)
         inside += count
-        reached += count if stop[0] == LATE else _row_cells(row, first, last, ray, wide, stop)
+        latest = max((SUB * first - u) * along, (SUB * last - u) * along) + (SUB * row - v) * step
+        if max(latest, 0) + wide[2] + 2 >= stop[0]:  # no cell is entered later than its centre is passed, and reach
+            count = _row_cells(row, first, last, ray, wide, stop)
+        reached += count
     return reached, inside - reached, total - inside
 
 

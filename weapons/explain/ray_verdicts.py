@@ -238,16 +238,20 @@ def _in_rows(lines: Lines, box_xyxy: Ints, ends: Terminations | None) -> Ints:
     begin = (SUB * first - u[line]) * along[line] + (SUB * row - v[line]) * aside[line]
     step, forward = SUB * np.maximum(np.abs(along), 1)[line], along[line] >= 0
     far = begin + np.where(forward, 1, -1) * step * (last - first)
-    begin = np.minimum(begin, far)  # when the line passes the centre of the first cell that it passes
+    begin, far = np.minimum(begin, far), np.maximum(begin, far)  # when the line passes the first centre, and the last
+    count, sure = last - first + 1, lines.radius >= DIAGONAL
+    whole = (begin >= 0) & (far <= time[line]) if sure else np.zeros(len(line), np.bool_)
+    found = np.bincount(line[whole], count[whole], len(lines)).astype(np.int64)
+    rest = np.flatnonzero(~whole & (begin <= time[line] + lines.wide_sides[line] + 1))
+    line, row, first, last, count = (column[rest] for column in (line, row, first, last, count))
+    begin, step, forward = begin[rest], step[rest], forward[rest]
     passed = np.maximum(time[line] - begin, -1) // step + 1
     before = np.where(begin < 0, -(begin // step), 0)
-    count = last - first + 1
-    sure = lines.radius >= DIAGONAL
     before = np.where(lines.length2[line] > 0, np.minimum(before, count), count) if sure else count
     passed = np.clip(passed, before, count)
     close = (np.maximum(time[line] + lines.wide_sides[line] + 1 - begin, -1)) // step + 1
     close = np.clip(close, passed, count)
-    found = np.bincount(line, passed - before, len(lines)).astype(np.int64)
+    found += np.bincount(line, passed - before, len(lines)).astype(np.int64)
     for a, b in ((np.zeros_like(before), before), (passed, close)):
         run, place = each_pixel(a, b - 1)
         cell = np.where(forward[run], first[run] + place, last[run] - place)
