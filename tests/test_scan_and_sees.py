@@ -288,7 +288,7 @@ def test_few_rays_are_followed_one_after_another(jit: bool, monkeypatch: pytest.
     """Those of several views, or too many, are not; nor are any if one of them cannot be."""
     scene, alone = yard(), []
     chosen = one_ray.chosen_follower
-    monkeypatch.setattr(one_ray, "chosen_follower", lambda *of: alone.append(of) or chosen(*of))
+    monkeypatch.setattr(one_ray, "chosen_follower", lambda *of, **how: alone.append(of) or chosen(*of, **how))
     for places, how, expected in (
         ([HERE], {}, 1), ([HERE] * 2, {}, 1), ([HERE] * 2, {"exclude": [0, 1]}, 0), ([HERE] * 99, {}, 0)
     ):  # fmt: skip
@@ -296,7 +296,7 @@ def test_few_rays_are_followed_one_after_another(jit: bool, monkeypatch: pytest.
         truth = np.concatenate([sees(scene, [place], TARGETS[:1]) for place in places])
         alone.clear()
         assert np.array_equal(sees(scene, places, TARGETS[:1], **how), truth) and len(alone) == expected
-    not_level = lambda *of: (lambda *line: chosen(*of)[0](*line) if line[3] else None, False)  # noqa: E731
+    not_level = lambda *of, **how: (lambda *line: chosen(*of, **how)[0](*line) if line[3] else None, False)  # noqa: E731
     monkeypatch.setattr(one_ray, "chosen_follower", not_level)
     level = [(60, HERE[1]), (1, HERE[1])]
     assert sees(scene, HERE, level).tolist() == [[False, True]]
@@ -383,7 +383,7 @@ def test_categories_have_names() -> None:
 
 NONSENSE: list[tuple[Any, str]] = [
     (lambda s: sees(None, HERE, HERE), "scene: expected a Scene or a History, got NoneType"),  # type: ignore[arg-type]
-    (lambda s: sees(s, (1, 2, 3), HERE), r"eyes: expected shape \(any, 2\), got \(3,\)"),
+    (lambda s: sees(s, (1, 2, 3), HERE), r"eyes: expected shape \(2,\) or \(any, 2\), got \(3,\)"),
     (lambda s: sees(s, [HERE, (math.nan, 2)], HERE), r"eyes\[1\]\[0\]: expected a finite number, got nan"),
     (lambda s: sees(s, HERE, "here"), r"targets: expected numbers, got 'here'"),
     (lambda s: sees(s, HERE, [(1, 2), (2, math.inf)]), r"targets\[1\]\[1\]: expected a finite number, got inf"),
