@@ -93,7 +93,8 @@ def verdicts_of_rays(walk: Walk, filters: Filters | None, bounds: Box | None) ->
 
 def cells_in(lines: Lines, box_xyxy: Ints, ends: Terminations | None = None) -> Ints:
     """Number of cells (n,) of lines in inclusive boxes (n, 4), each in its own; with ends only those before them."""
-    count, kept = np.zeros(len(lines), np.int64), np.flatnonzero((box_xyxy[:, :2] <= box_xyxy[:, 2:]).all(axis=1))
+    left, top, right, low = box_xyxy.T
+    count, kept = np.zeros(len(lines), np.int64), np.flatnonzero((left <= right) & (top <= low))
     if len(kept):  # many lines lie outside the bounds
         cells = _wide_cells_in if lines.radius else _thin_cells_in
         count[kept] = cells(lines.take(kept), box_xyxy[kept], None if ends is None else ends.take(kept))
@@ -156,7 +157,7 @@ class Borders(Columns):
         base = -((ahead > 0) & (first == 0)).astype(np.int64)
         first = np.where((length == 0) & (first > 0), 2, first)  # such a line runs along a border, or crosses none
         across = np.maximum(length, 1)
-        last, still = across.prod(axis=1), (length == 0).any(axis=1)
+        last, still = across[:, 0] * across[:, 1], (length[:, 0] == 0) | (length[:, 1] == 0)
         return cls(first, across[:, ::-1], base, ahead, last, still, *_at_once(first, across))
 
     def crossed(self, time: Ints) -> Ints:
@@ -168,8 +169,8 @@ class Borders(Columns):
 
         A line along an axis has all cells beside it, of one row of pixels or of two.
         """
-        corners, crossed = np.maximum((time - self.phase) // self.period + 1, 0), self.crossed(time)
-        count = np.where(self.still, (1 + crossed).prod(axis=1), 1 + crossed.sum(axis=1) + corners)
+        corners, (x, y) = np.maximum((time - self.phase) // self.period + 1, 0), self.crossed(time).T
+        count = np.where(self.still, (1 + x) * (1 + y), 1 + x + y + corners)
         return np.where(time < 0, 0, count)
 
     def cells_in(self, box_xyxy: Ints, time: Ints) -> Ints:
@@ -188,13 +189,13 @@ class Borders(Columns):
     def _up_to(self, x: Ints, y: Ints, time: Ints) -> Ints:
         """Number of cells entered by a time, after at most `x` borders along x, and `y` along y."""
         most = np.stack([x, y], axis=1)
-        left = np.where(most < self.crossed(self.last), (self.first + SUB * most) * self.across, NEVER)
-        out = left.min(axis=1)
-        at_once = (left[:, 0] != left[:, 1]) & (out >= self.phase) & ((out - self.phase) % self.period == 0)
+        left_x, left_y = np.where(most < self.crossed(self.last), (self.first + SUB * most) * self.across, NEVER).T
+        out = np.minimum(left_x, left_y)
+        at_once = (left_x != left_y) & (out >= self.phase) & ((out - self.phase) % self.period == 0)
         count = np.where(time < out, self.cells_by(time), self.cells_by(out - 1) + (at_once & (out <= time)))
-        along_axis = (1 + np.minimum(self.crossed(np.where(self.still, time, 0)), most)).prod(axis=1)
-        count = np.where(self.still | (out == 0), along_axis, count)  # or of a line that leaves as it starts
-        return np.where((most < 0).any(axis=1) | (time < 0), 0, count)
+        beside_x, beside_y = 1 + np.minimum(self.crossed(np.where(self.still, time, 0)), most).T
+        count = np.where(self.still | (out == 0), beside_x * beside_y, count)  # or of a line that leaves as it starts
+        return np.where((x < 0) | (y < 0) | (time < 0), 0, count)
 
 
 def _at_once(first: Ints, length: Ints) -> tuple[Ints, Ints]:
