@@ -5,6 +5,7 @@ import math
 from collections.abc import Callable
 from fractions import Fraction
 from importlib.util import find_spec
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -410,6 +411,14 @@ def test_quarter_turns_split_the_angle(degrees: float) -> None:
     for _ in range(k):
         c, s = -s, c
     assert (c, s) == unit(degrees) == fixed_point.unit_of(degrees)
+
+
+def test_few_angles_are_split_as_many_are() -> None:
+    some = np.concatenate([np.random.default_rng(1).uniform(-800, 800, 300), 7.5 * np.arange(-60, 60)]).tolist()
+    many = fixed_point.all_quarter_turns(some)
+    for n in (1, fixed_point.FEW_ANGLES, fixed_point.FEW_ANGLES + 1):
+        few = [fixed_point.all_quarter_turns(some[k : k + n]) for k in range(0, len(some), n)]
+        assert [list(chain(*column)) for column in zip(*few, strict=True)] == many
 
 
 points_256 = st.tuples(st.integers(-(2**28), 2**28), st.integers(-(2**28), 2**28))

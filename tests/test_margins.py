@@ -143,10 +143,26 @@ def test_margins_with_a_line_of_sight_know_what_lies_beyond_the_reach_of_the_sho
 def test_margins_do_not_depend_on_how_many_shifts_are_tried_at_a_time(
     weapon: Weapon, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """Nor on whether the scene has changed, which leaves them to the reference."""
     scene = Scene()
     for at in ((0, 3), (6, 0), (-9, 2), (1, -8)):
         scene.add(Sprite.box(3, 3), at)
     hits = fire(scene, weapon, (0, 0))
     told = hits.margins()
+    scene.move(0, (0, -3))
+    assert hits.margins() == told
     monkeypatch.setattr("hitplanes.weapons.explain.margins.CHUNK_SAMPLES", 30)
     assert hits.margins() == told != []
+
+
+@pytest.mark.parametrize("inside", ["hit", "ignore_until_exit", "error"])
+def test_margins_of_cover_are_those_of_the_reference(inside: str, jit: bool) -> None:
+    """Of a shot that some shifts would begin inside a wall, too."""
+    scene, weapon = Scene((90, 80)), Disc(20, line_of_sight="occluders", inside=inside)
+    for k, at in enumerate(np.random.default_rng(4).integers(5, 75, (24, 2)).tolist()):
+        scene.add(Sprite.box(5, 3), at, role="occluder" if k % 4 == 0 else "hittable", angle=31 * k)
+    starts = [(x, y) for x in (20, 44, 66) for y in (17, 40, 60) if fire(scene, Point(), (x, y)).verdicts[0, 1] == 0]
+    hits = fire(scene, weapon, starts)
+    told = hits.margins()
+    scene.move(0, (-50, -50))
+    assert hits.margins() == told and len({margin.distance for margin in told}) > 3

@@ -56,6 +56,7 @@ Whole = TypeVar("Whole", int, Ints)
 _PI = (31415926535897932384626433832795028841971693993751, 10**49)
 _FIXED_BITS = 160  # as exact as _PI
 
+FEW_ANGLES = 24  # most angles that are split one after another, which takes less time than the calls of numpy
 ANGLES_KEPT = 2**12  # angles whose directions are kept: objects turn by the same steps again and again
 
 DIGIT, DIVISORS_MOST = 20, 2**40
@@ -181,7 +182,9 @@ def quarter_turns(degrees: float) -> tuple[int, int, int]:
 
 
 def all_quarter_turns(degrees: Sequence[float]) -> list[list[int]]:
-    """`quarter_turns` of angles, as three columns."""
+    """`quarter_turns` of angles, as three columns; of a few one after another."""
+    if 0 < len(degrees) <= FEW_ANGLES:
+        return list(map(list, zip(*map(quarter_turns, degrees), strict=True)))
     return [column.tolist() for column in all_quarters(np.stack(unit(degrees), axis=1))]
 
 

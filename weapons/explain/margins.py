@@ -19,9 +19,11 @@ from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
 from .. import late
+from ..fire.call import fired
 from ..fire.plan import Plan
 from ..fire.spans import context_of, direct
 from ..fire.strategy import AUTO
+from ..kinds.areas import parts_of
 from ..kinds.placements import Placements, Shots, placements_for
 from ..kinds.rays import Pistol
 from ..kinds.weapon import Weapon
@@ -74,17 +76,23 @@ RAY_SHIFTS = _by_length(np.concatenate([PATTERN_SHIFTS / part for part in (1, 4,
 def pattern_margins(scene: Scene, stack: Stack, weapon: Weapon, shot: Shots, number: int) -> list[Margin]:
     """Margins of the objects that a pattern comes to hit, or no longer hits, if it is shifted.
 
-    They are sorted by object; `shot` is a batch of one, and `number` that of the shot.
+    They are sorted by object; `shot` is a batch of one, and `number` that of the shot. Once the scene has changed, or
+    if a shifted shot may be refused, the reference answers, which needs nothing but the stack of then.
     """
     if not len(stack):
         return []
-    context, placements = context_of(scene, stack, weapon, shot, MARGIN_PX), placements_for(weapon, shot)
+    placements = placements_for(weapon, shot)
+    anew = stack is not scene.items.stack() or parts_of(weapon)[2].inside == "error"
+    context = context_of(scene, stack, weapon, shot, MARGIN_PX) if anew else None
 
     def hit_at(shifts: Shifts) -> tuple[Ints, Ints]:
+        if context is None:
+            hits = fired(scene, weapon, _moved(shot, shifts))
+            return hits.shot, stack.ranks(hits.object)
         met = direct(_shifted(placements, shifts), shot, context)
         return met.placement // len(placements), met.rank
 
-    step = max(1, CHUNK_SAMPLES // max(int(placements.count.sum()), 1))
+    step = max(1, CHUNK_SAMPLES // max(int(placements.count.sum()), 1)) if context else len(PATTERN_SHIFTS)
     return _margins(hit_at, PATTERN_SHIFTS, step, stack, number)
 
 
