@@ -179,7 +179,7 @@ def test_passes_are_read_after_items_have_moved_and_gained_speed(jit: bool) -> N
 
 def test_roots_and_shares_of_the_kernel_are_exact() -> None:
     """Also where products of 64 bits wrap around."""
-    jit, rng = pytest.importorskip("hitplanes.planes.jit.raycast"), random.Random(4)
+    jit, rng = pytest.importorskip("hitplanes.planes.jit.planes"), random.Random(4)
     njit = importlib.import_module("numba").njit  # with an entry for Python
     half_chord, share = (njit(helper.py_func) for helper in (jit.half_chord, jit.share))
     for bits in (3, 20, 30, 40, 56):

@@ -12,9 +12,11 @@ from speed_static import Settings, modes
 from speed_weapons import AIMS, WEAPONS, questions
 from speed_world import WORLD, scene_of
 
-from hitplanes import Disc, Scene, Weapon, fire
+from hitplanes import Disc, Pistol, Scene, Spread, Weapon, fire
 
-FADING: dict[str, Weapon] = {"disc r=40, linear falloff": Disc(40, falloff="linear")}
+OTHERS: dict[str, Weapon] = {
+    "disc r=40, linear falloff": Disc(40, falloff="linear"), "spread 8 pistols": Spread(Pistol(500), 8, 40),
+}  # fmt: skip
 
 MOVED = 3
 """Objects lie at so many places in turn, a pixel apart."""
@@ -24,7 +26,7 @@ def alone(settings: Settings) -> Iterator[Cell]:
     """Each weapon, each number of objects."""
     for objects in settings.single:
         scenes = {mode: scene_of(objects) for mode in modes(settings)}  # what is kept for a scene is of one mode
-        for name, weapon in (WEAPONS | FADING).items():
+        for name, weapon in (WEAPONS | OTHERS).items():
             asked = ("aims again", "new aims", "all move") if "new aims" in questions(weapon) else ("again", "all move")
             for what in asked:
                 kind = moved if what == "all move" else still
