@@ -27,7 +27,7 @@ from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
 from ..fire.prefilter import Filters
-from ..fire.strategy import RAY_WAYS, chosen_ray_way
+from ..fire.strategy import RAY_WAYS, are_faster_alone, chosen_ray_way
 from ..kinds.rays import RayWeapon
 from .contacts import NEVER, Reason
 from .first_hit import marcher
@@ -86,7 +86,8 @@ def chosen_follower(
     """Function that follows each of so many rays by the way chosen now, and whether the next may go another way.
 
     A ray is cast if it comes to several pixels at once by march. One that passes too many rows of masks is cast in
-    arrays, or None is returned of it if `in_arrays` is False, as of rays that must walk.
+    arrays, or None is returned of it if `in_arrays` is False, as of rays that must walk, and of several rays that take
+    less time together.
     """
     chosen = chosen_ray_way("auto", False, ray, scene, stack, view, rays, prepared=True)
     bounds, radius, most = scene.bounds, ray.radius_256, ray.hits_most
@@ -100,7 +101,8 @@ def chosen_follower(
     if chosen.way == "march":
         march = marcher(scene, stack, view)
         return lambda *line: march(*line) or cast(*line), chosen.pending
-    return (lambda *_: None) if RAY_WAYS["cast"](ray, scene, view) else cast, chosen.pending
+    alone_pays = not RAY_WAYS["cast"](ray, scene, view) and (rays == 1 or are_faster_alone(rays, stack))
+    return cast if alone_pays else lambda *_: None, chosen.pending
 
 
 def follower(stack: Stack, bounds: Box | None, view: View, radius: int, most: int | None) -> Follow:
