@@ -268,9 +268,11 @@ def test_long_names_are_cut_in_their_middle() -> None:
     scene = Scene((60, 40))
     for number in (1, 2):
         scene.add(Sprite.circle(8), (20 * number, 20), name=f"{'a crate ' * 9}{number}")
+    scene.add(Sprite.box(9, 30), (50, 20), role="occluder", name=f"{'WALL ' * 9}3")
     shot = report_of(scene, [fire(scene, Disc(30), (30, 20))])["shots"][0]
     card = shot_card(shot, 0, scene)
     names = [text.text for text in card.draw(np.zeros((card.height, 464, 3), np.uint8), 0, 0, 464)]
+    assert {name.count("...") for name in names} == {0, 1}  # once also beside what it blocks
     assert sum(name.startswith("a crate") and name.endswith(" 1") for name in names) == 1
 
 

@@ -122,11 +122,14 @@ class Card:
 
 
 def _name_in(room: int, name: str) -> str:
-    """A name cut in its middle to a width, px."""
-    most = min(len(name), max(room // 2, 5))  # a letter is at least two pixels wide
-    while text_width(short(name, most)) > room and most > 5:
-        most -= 1
-    return short(name, most)
+    """A name cut in its middle to a width, px; one that is cut already loses more there."""
+    left, cut, right = name.partition("...")
+    if not cut:
+        left, right = name[: len(name) // 2], name[len(name) // 2 :]
+    while text_width(name) > room and len(left + right) > 2:
+        left, right = (left[:-1], right) if len(left) > len(right) else (left, right[1:])
+        name = f"{left}...{right}"
+    return name
 
 
 def shot_card(shot: Mapping[str, Any], number: int, scene: Scene, now: str | None = None) -> Card:
