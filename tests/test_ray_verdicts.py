@@ -81,6 +81,16 @@ def test_cells_are_counted_as_they_are_listed(radius: int) -> None:
         assert (cells_in(lines, cut) < cells_in(lines, extent)).any()
 
 
+@pytest.mark.parametrize("radius", RADII)
+def test_cells_of_points_in_boxes_of_one_column_or_row(radius: int) -> None:
+    """A disc that does not move covers no corner of the square around it."""
+    rng = np.random.default_rng(radius)
+    lines = Lines(rng.integers(-128, 128, (400, 2)), np.zeros((400, 2), np.int64), radius)
+    box, at, side = lines.box_xyxy.copy(), np.arange(400), rng.integers(0, 2, 400)
+    box[at, side] = box[at, side + 2] = rng.integers(-3, 4, 400)
+    assert np.array_equal(cells_in(lines, box), counted_one_by_one(lines, box))
+
+
 @pytest.mark.parametrize(
     ("start", "end", "cells"),
     [

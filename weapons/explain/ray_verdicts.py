@@ -241,7 +241,7 @@ def _in_rows(lines: Lines, box_xyxy: Ints, ends: Terminations | None) -> Ints:
     far = begin + np.where(forward, 1, -1) * step * (last - first)
     begin, far = np.minimum(begin, far), np.maximum(begin, far)  # when the line passes the first centre, and the last
     count, sure = last - first + 1, lines.radius >= DIAGONAL
-    whole = (begin >= 0) & (far <= time[line]) if sure else np.zeros(len(line), np.bool_)
+    whole = (lines.length2[line] > 0) & (begin >= 0) & (far <= time[line]) & sure
     found = np.bincount(line[whole], count[whole], len(lines)).astype(np.int64)
     rest = np.flatnonzero(~whole & (begin <= time[line] + lines.wide_sides[line] + 1))
     line, row, first, last, count = (column[rest] for column in (line, row, first, last, count))
