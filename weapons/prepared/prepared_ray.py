@@ -43,7 +43,7 @@ Pair = tuple[float, float]
 Vector = tuple[int, int]
 """Start of a ray, or the vector from there to its end, 1/256 px."""
 
-NUMBERS_KEPT = 256  # shot numbers whose pellets a weapon keeps
+NUMBERS_KEPT = 1024  # shots whose pellets are kept
 
 ENTRY = 4
 """Place in a row of `Followed` of the time at which the ray enters the object."""
@@ -210,25 +210,28 @@ class ReadyRay(Ready[RayHits]):
         self._present = self._snapshot(version, stack, cost=cost)
 
 
+@lru_cache(NUMBERS_KEPT)
+def _offsets(spread: Spread[Any], seed: int, number: int) -> list[Vector]:
+    """Offsets of the pellets of a shot number, 1/256 px."""
+    pellets_xy = pellets_of(spread, np.array([seed], np.uint64), np.array([number]), ZEROS[:1])[0]
+    return [(SUB * x, SUB * y) for x, y in pellets_xy.tolist()]
+
+
 class ReadySpread(ReadyRay):
     """Prepared spread of a few rays that end at their first hit; see `ReadyRay` for what is left to `fire`."""
 
     def __init__(self, scene: Scene, weapon: Weapon, kept: Filter, ray: RayWeapon, spread: Spread[Any]) -> None:
         super().__init__(scene, weapon, kept, ray)
-        self.rays, self._spread, self._offsets = spread.count, spread, lru_cache(NUMBERS_KEPT)(self._drawn)
+        self.rays, self._spread = spread.count, spread
 
     def _with(self, kept: Filter) -> ReadySpread:
         return ReadySpread(self.scene, self.weapon, kept, self._ray, self._spread)
 
-    def _drawn(self, number: int) -> list[Vector]:
-        """Offsets of the pellets of a shot number, 1/256 px."""
-        seed, zero = np.array([self._filter.seed], np.uint64), ZEROS[:1]
-        return [(SUB * x, SUB * y) for x, y in pellets_of(self._spread, seed, np.array([number]), zero)[0].tolist()]
-
     def _answered(self, hits: OneShotOfRays, start: Vector, step: Vector) -> bool:
         """Add the rows of a shot to its answer, those of the nearest hit first; False if it is left to `fire`."""
         follow, ends, met = self._follows or self._chosen(), [], []
-        for dx, dy in self._offsets(hits._arguments[2] or 0):
+        number: Any = hits._arguments[2] or 0
+        for dx, dy in _offsets(self._spread, self._filter.seed, number):
             end = step[0] + dx, step[1] + dy
             followed = follow(*start, *end)
             if followed is None or self._must_walk(*followed):
