@@ -24,7 +24,7 @@ from ..fire.plan import Plan
 from ..fire.spans import context_of, direct
 from ..fire.strategy import AUTO
 from ..kinds.areas import parts_of
-from ..kinds.placements import Placements, Shots, placements_for
+from ..kinds.placements import Shots, placements_for
 from ..kinds.rays import Pistol
 from ..kinds.weapon import Weapon
 from ..rays.contacts import Parts, Reason, rays_each
@@ -81,27 +81,22 @@ def pattern_margins(scene: Scene, stack: Stack, weapon: Weapon, shot: Shots, num
     """
     if not len(stack):
         return []
-    placements = placements_for(weapon, shot)
     anew = stack is not scene.items.stack() or parts_of(weapon)[2].inside == "error"
     context = context_of(scene, stack, weapon, shot, MARGIN_PX) if anew else None
 
     def hit_at(shifts: Shifts) -> tuple[Ints, Ints]:
+        moved = _moved(shot, shifts)
         if context is None:
-            hits = fired(scene, weapon, _moved(shot, shifts))
+            hits = fired(scene, weapon, moved)
             return hits.shot, stack.ranks(hits.object)
-        met = direct(_shifted(placements, shifts), shot, context)
-        return met.placement // len(placements), met.rank
+        placements = placements_for(weapon, moved)
+        met = direct(placements, moved, context)
+        return placements.shot[met.placement], met.rank
 
-    step = max(1, CHUNK_SAMPLES // max(int(placements.count.sum()), 1)) if context else len(PATTERN_SHIFTS)
+    step = len(PATTERN_SHIFTS)
+    if context is not None:
+        step = max(1, CHUNK_SAMPLES // max(int(placements_for(weapon, shot).count.sum()), 1))
     return _margins(hit_at, PATTERN_SHIFTS, step, stack, number)
-
-
-def _shifted(placements: Placements, shifts: Shifts) -> Placements:
-    """Placements repeated for each shift, all as placements of shot 0."""
-    n, table = len(shifts), placements.table
-    xy = np.tile(placements.xy, (n, 1)) + np.repeat(shifts, len(placements), axis=0)
-    pattern, turn_xy = np.tile(placements.pattern, n), np.tile(placements.turn_xy, (n, 1))
-    return Placements(table, pattern, xy, turn_xy, placements.rounds, placements.pellets, _shot=0)
 
 
 def ray_margins(scene: Scene, parts: Parts, shot: Shots, number: int) -> list[Margin]:

@@ -41,6 +41,7 @@ SIGHTS = ("occluders", "all")
 
 FOLLOWED_MOST = 32
 """Most rays of a shot that a ready weapon follows one by one; more take less time together."""
+
 ORIGIN, ONE_RING = np.zeros(2, np.int64), np.zeros(1, np.int64)
 RING = Numbers((None, 2), REACH_MAX / 2, least=3)
 

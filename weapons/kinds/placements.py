@@ -210,7 +210,6 @@ class Placements:
     xy : (P, 2) whole pixel that the pattern is placed on
     turn_xy : (T, 2) whole pixel of each round of each shot; distances are counted from it
     rounds, pellets : rounds of a shot, and pellets of a round
-    shot : number of the shot, if all are placements of the same one
     """
 
     table: PatternTable
@@ -219,7 +218,6 @@ class Placements:
     turn_xy: Ints
     rounds: int = 1
     pellets: int = 1
-    _shot: int | None = None
 
     def __len__(self) -> int:
         return len(self.xy)
@@ -259,7 +257,7 @@ class Placements:
         round_ = None
         if self.rounds > 1:
             turn, round_ = np.divmod(turn, self.rounds)
-        return turn if self._shot is None else np.full_like(turn, self._shot), round_
+        return turn, round_
 
     @property
     def boxes(self) -> Ints:
