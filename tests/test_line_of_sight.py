@@ -307,6 +307,21 @@ def test_shares_blockers_and_why_not() -> None:
     assert all(share.exposed == 1 for share in near)
 
 
+def test_exposed_is_what_any_pellet_sees() -> None:
+    """Pellets on both sides of a crate each see another part of the guard behind it."""
+    scene = Scene((90, 60))
+    guard = scene.add(Sprite.box(9, 31), (70, 30))
+    scene.add(Sprite.box(3, 11), (40, 30), role="occluder")
+    hits = fire(scene, Spread(Disc(60, line_of_sight="occluders"), 4, 25), (15, 30), seed=3)
+    alone = [
+        fire(scene, Disc(99, line_of_sight="occluders"), own).pixels_at()
+        for own in placements_for(hits.weapon, hits.shots).xy.tolist()
+    ]
+    seen = [set(map(tuple, pixels[0, guard].pixels().tolist())) for pixels in alone if pixels]
+    (share,) = hits.shares()
+    assert share.exposed == len(set.union(*seen)) / (9 * 31) > max(map(len, seen)) / (9 * 31)
+
+
 @pytest.mark.parametrize("strategy", WAYS)
 def test_the_plan_says_what_may_shelter(strategy: str) -> None:
     near, far = (fire(street(), Disc(9, line_of_sight="all"), at, strategy=strategy).plan for at in ((38, 15), (9, 9)))

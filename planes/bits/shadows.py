@@ -198,14 +198,14 @@ class Wedges(NamedTuple):
         return np.ceil(left * away / top), np.floor(right * away / low), none, -none
 
 
-def seen_from(origin_xy: Ints, blockers: Blockers, blocker: Ints) -> Sequence[Wedges | Edges]:
-    """Blockers (k,) as seen from origins (k, 2).
+def seen_from(origin_xy: Ints, blockers: Blockers, blocker: Ints, height: int = WORD) -> Sequence[Wedges | Edges]:
+    """Blockers (k,) as seen from origins (k, 2), to hide pixels in `height` rows.
 
     A part that lies above or below the origin as a whole has a connected shadow, as its rectangles touch: beyond it,
-    that of all of them is what lies between the outermost corners. Of few rectangles each is looked at in all rows.
+    that of all of them is what lies between the outermost corners. Few rectangles are each looked at in all rows.
     """
     place, rects, new = blockers.rects_of(blocker, origin_xy)
-    if len(place) <= FEW_WAYS:
+    if len(place) * height <= FEW_WAYS * WORD:
         every = np.full(len(place), FARTHEST)
         return [Edges(place, -every, every, rects)]
     new |= begins(place)
@@ -450,11 +450,13 @@ def _hidden_by_pairs(
     return pair[which], run[which], first, last
 
 
-def sheltered_pixels(runs: Runs, origin_xy: Ints, blockers: Blockers, placement: Ints, blocker: Ints) -> Ints:
-    """Number of pixels (n,) of each run that any blocker shelters; parameters are those of `shelter_of`."""
+def sheltered_stretches(
+    runs: Runs, origin_xy: Ints, blockers: Blockers, placement: Ints, blocker: Ints
+) -> tuple[Ints, Ints, Ints]:
+    """Stretches of runs that any blocker shelters, as (run, x_first, x_last), sorted and apart; see `shelter_of`."""
     run, first, last = _hidden(runs, origin_xy, blockers, placement, blocker)[1:]
     which, first, last = merged_runs(run, first, last)
-    return np.bincount(run[which], last - first + 1, len(runs)).astype(np.int64)
+    return run[which], first, last
 
 
 def _hidden(
@@ -467,7 +469,7 @@ def _hidden(
         for k, first, number in zip(begun.tolist(), begin.tolist(), count.tolist(), strict=True):
             found += _hidden_after_exit(runs, placement[k], k, origin[k], rects[first : first + number])
         pair = np.delete(pair, begun)
-    for seen in seen_from(origin[pair], blockers, blocker[pair]):
+    for seen in seen_from(origin[pair], blockers, blocker[pair], len(runs)):
         of = pair[seen.place]
         begin, count = runs.in_rows(placement[of], seen.low + origin[of, 1], seen.high + origin[of, 1])
         for piece in pieces(count, CHUNK_SAMPLES):

@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hitplanes.planes import late
 from hitplanes.planes.bits.span_walk import BLOCK, HIT, SHELTERED, SKIP, VERDICT_OF, Events, Runs, Verdict, ends, walk
 from hitplanes.planes.common.checks import Bools, InputError, Ints
 from hitplanes.planes.common.limits import CHUNK_SAMPLES, DETAIL_SAMPLES_MAX, NEAR_PX
@@ -18,7 +17,7 @@ from hitplanes.planes.grid.spans import Box, Spans, clipped, each_pixel, pieces
 from hitplanes.planes.scene.items import Stack
 
 from ..fire.prefilter import QueryContext, pairs_of, refused
-from ..fire.shelter import shelter_ranks, sheltered
+from ..fire.shelter import hidden_from, shelter_ranks, sheltered
 from ..kinds.areas import parts_of
 from ..kinds.placements import Placements, Shots, placements_for
 from ..kinds.weapon import Weapon
@@ -225,18 +224,19 @@ def shares_of(context: QueryContext, weapon: Weapon, shots: Shots, rows: Sequenc
 
 
 def _exposed(visible: Bools, rank: int, origin_xy: Ints, shot: Shots, context: QueryContext) -> int:
-    """Number of visible pixels of an object that lie in the line of sight of any pellet (P, 2) of one shot."""
-    blockers, box, pellets = context.blockers, context.stack.box_xyxy[rank], len(origin_xy)
+    """Number of visible pixels of an object that lie in the line of sight of any pellet (P, 2) of one shot.
+
+    A pellet is only asked about what is hidden from all pellets before it.
+    """
+    x, y = context.stack.box_xyxy[rank, :2].tolist()
+    spans = Spans.from_mask(visible, (x, y))
+    none = np.zeros_like(spans.y)
+    hidden, blockers = Runs(none, spans.y, spans.x_first, spans.x_last, none), context.blockers
     if blockers is None:
-        return int(np.count_nonzero(visible))
-    spans = Spans.from_mask(visible, (int(box[0]), int(box[1])))
-    y, x_first, x_last = (np.tile(side, pellets) for side in (spans.y, spans.x_first, spans.x_last))
-    runs = Runs(np.arange(pellets).repeat(len(spans)), y, x_first, x_last, np.zeros_like(y))
-    pellet, blocker = late.shadows.all_ways_met(np.tile(box, (pellets, 1)), origin_xy, blockers)
-    met = ~refused(context.stack, blockers.rank[blocker], shot, np.zeros(len(blocker), np.int64))
-    shelter = late.shadows.shelter_of(runs, origin_xy, blockers, pellet[met], blocker[met])
-    hidden = shelter.hides(np.arange(len(shelter.items)), np.array(rank)).reshape(pellets, -1)
-    return int((~hidden.all(axis=0)).sum())
+        return spans.count
+    for origin in np.unique(origin_xy, axis=0):
+        hidden = hidden_from(origin, hidden, rank, shot, context.stack, blockers)
+    return spans.count - int(hidden.lengths.sum())
 
 
 def why_not_of(detail: Detail, hit: Set[int]) -> list[WhyNot]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -107,8 +108,21 @@ def sheltered_pixels(runs: Runs, placements: Placements, shots: Shots, stack: St
     for part in pieces(rects[runs.placement].astype(np.int64), CHUNK_CELLS):
         strip = runs.take(part)
         near = _near(strip, placements, shots, stack, blockers)
-        np.add.at(counts, strip.placement, late.shadows.sheltered_pixels(strip, placements.xy, blockers, *near))
+        run, first, last = late.shadows.sheltered_stretches(strip, placements.xy, blockers, *near)
+        np.add.at(counts, strip.placement[run], last - first + 1)
     return counts
+
+
+def hidden_from(origin_xy: Ints, runs: Runs, rank: int, shot: Shots, stack: Stack, blockers: Blockers) -> Runs:
+    """What an origin (2,) of a single shot does not see of runs of one item, as it does not shelter itself."""
+    if not len(runs):
+        return runs
+    box = np.array([[runs.x_first.min(), runs.y[0], runs.x_last.max(), runs.y[-1]]])
+    place, blocker = late.shadows.all_ways_met(box, origin_xy[None], blockers)
+    other = (blockers.rank[blocker] != rank) & ~refused(stack, blockers.rank[blocker], shot, place)
+    near = place[other], blocker[other]
+    run, first, last = late.shadows.sheltered_stretches(runs, origin_xy[None], blockers, *near)
+    return replace(runs.take(run), x_first=first, x_last=last)
 
 
 def shelter_ranks(
