@@ -59,6 +59,7 @@ _FIXED_BITS = 160  # as exact as _PI
 FEW_ANGLES = 24  # most angles that are split one after another, which takes less time than the calls of numpy
 ANGLES_KEPT = 2**12  # angles whose directions are kept: objects turn by the same steps again and again
 
+EXACT_ROOT = 2**52  # up to it the float root of a number below a square lies below the square's root
 DIGIT, DIVISORS_MOST = 20, 2**40
 """Bits of a digit of `muldiv`, and divisors of which a remainder, and a digit more, have room in int64."""
 
@@ -103,6 +104,8 @@ def isqrt(values: Ints) -> Ints:
     """Floor of the square root of non-negative int64 values, exactly."""
     values = np.asarray(values, np.int64)
     root = np.sqrt(values.astype(np.float64)).astype(np.int64)
+    if values.max(initial=0) <= EXACT_ROOT:
+        return root
     root = np.minimum(root, 3_037_000_499)  # floor(sqrt(2**63 - 1)): its square must not wrap
     root -= root * root > values
     above = np.minimum(root + 1, 3_037_000_499)

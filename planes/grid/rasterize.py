@@ -25,16 +25,18 @@ import numpy.typing as npt
 
 from ..common.checks import Bools, Floats, Ints
 from ..common.limits import HALF, SUB, TRIG_BITS
-from .fixed_point import ONE, far_roots, isqrt, pixel, turned
+from .fixed_point import ONE, far_roots, isqrt, pixel, scaled
 from .spans import WIDEST, RowRuns, Spans, each_pixel, in_rows, ragged, rectangles
 
+ORIGIN = np.zeros(2, np.int64)
 QUOTIENT_ERROR = 2.0**-50  # most relative error of a quotient of two numbers, rounded to float64, times a row number
 
 
 def disc(radius: int) -> Spans:
     """Centres at most `radius` from the origin."""
     y = _rows(-radius, radius)
-    return Spans(y, *_disc_about(np.zeros(2, np.int64), radius, y))
+    half = isqrt(radius * radius - (SUB * y) ** 2) // SUB
+    return Spans(y, -half, half)
 
 
 def ring(inner: int, outer: int) -> Spans:
@@ -117,29 +119,28 @@ def convex_polygons(points: Ints) -> RowRuns | None:
 
     A row of a convex polygon begins at an edge that goes up and ends at one that goes down, or the other way round.
     """
-    step = np.roll(points, -1, axis=1) - points
-    following = np.roll(step, -1, axis=1)
+    count, corners, _ = points.shape
+    after = np.arange(1 - corners, 1)  # the corner after each; index 0 is the last one's
+    step = points.take(after, axis=1) - points
+    following = step.take(after, axis=1)
     turn = step[..., 0] * following[..., 1] - step[..., 1] * following[..., 0]
-    clockwise: Bools = np.asarray((turn >= 0).all(axis=1))
+    clockwise, other = (turn >= 0).all(axis=1), (turn <= 0).all(axis=1)
     up = step[..., 1] < 0
-    onward = ((turn != 0) | ((step * following).sum(axis=2) > 0)).all(axis=1)
-    once = onward & ((np.roll(up, -1, axis=1) != up).sum(axis=1) <= 2)  # it goes around only once
-    if not (once & (clockwise | (turn <= 0).all(axis=1)) & turn.any(axis=1) & step[..., 1].any(axis=1)).all():
+    good = (clockwise ^ other) & up.any(axis=1) & ((turn != 0) | ((step * following).sum(axis=2) > 0)).all(axis=1)
+    if not (good & ((up.take(after, axis=1) != up).sum(axis=1) <= 2)).all():  # it goes around only once
         return None
     top = -(-points[..., 1].min(axis=1) // SUB)
     shape, y = _ragged_rows(top, points[..., 1].max(axis=1) // SUB)
-    begin = np.searchsorted(shape, np.arange(len(points))) - top
-    first, last = np.full(len(y), WIDEST), np.full(len(y), -WIDEST)
-    ends = np.concatenate([points, step], axis=2).reshape(-1, 4)
-    rises = ((step[..., 1] < 0) == clockwise[:, None]).reshape(-1)
-    for side, upward in ((first, True), (last, False)):
-        at = np.flatnonzero((ends[:, 3] != 0) & (rises == upward))
-        x0, y0, dx, dy = ends[at].T
-        x0, y0, dx, dy = np.where(dy < 0, (x0 + dx, y0 + dy, -dx, -dy), (x0, y0, dx, dy))
-        edge, row = _ragged_rows(-(-y0 // SUB), (y0 + dy) // SUB)
-        across, per = (x0 * dy - y0 * dx)[edge] + (SUB * dx)[edge] * row, (SUB * dy)[edge]
-        side[begin[at // points.shape[1]][edge] + row] = -(-across // per) if upward else across // per
-    return RowRuns(shape, y, [(first, last)])
+    ends = np.empty((2, len(y)), np.int64)  # each row meets edges on both of its sides
+    at = step[..., 1].reshape(-1).nonzero()[0]
+    of, (x0, y0), (dx, dy) = at // corners, points.reshape(-1, 2)[at].T, step.reshape(-1, 2)[at].T
+    edge, row = _ragged_rows(-(-np.minimum(y0, y0 + dy) // SUB), np.maximum(y0, y0 + dy) // SUB)
+    winding, per = np.where(clockwise, 1, -1)[of], SUB * np.abs(dy)
+    across = (winding * (x0 * dy - y0 * dx)).take(edge) + (winding * SUB * dx).take(edge) * row
+    side = winding * np.sign(dy)  # -1 if the edge begins rows, whose quotients are rounded up: -floor(-q)
+    place = (shape.searchsorted(np.arange(count)) - top)[of] + np.where(side > 0, len(y), 0)
+    ends.reshape(-1)[place.take(edge) + row] = across // per.take(edge) * side.take(edge)
+    return RowRuns(shape, y, ends[None])
 
 
 def beams(a: Ints, b: Ints, radius: int) -> RowRuns:
@@ -153,25 +154,34 @@ def beams(a: Ints, b: Ints, radius: int) -> RowRuns:
     low, high = np.minimum(a[1], b[:, 1]), np.maximum(a[1], b[:, 1])
     reach = max(radius, HALF)
     shape, y = _ragged_rows(-(-(low - reach) // SUB), (high + reach) // SUB)
-    first, last = _disc_about(a, radius, y)
-    x, level = b[:, 0][shape], SUB * y - b[:, 1][shape]
-    for begin, end in (_disc_rows(x, level, radius), _between(a, step, radius, shape, y)):
-        first, last = np.minimum(first, begin), np.maximum(last, end)
+    first, last = _between(a, step, radius, shape, y)
+    for center in (np.broadcast_to(a, b.shape), b):
+        _add_discs(center, radius, shape, y, first, last)
     axis = [] if radius >= DIAGONAL else [_axis_rows(a, step, shape, y)]
     return RowRuns(shape, y, [(first, last), *axis])
 
 
 def _between(a: Ints, step: Ints, radius: int, shape: Ints, y: Ints) -> tuple[Ints, Ints]:
     """Runs of the centres p beside segments: 0 <= (p - a) . d <= |d|^2, and |(p - a) x d| <= radius |d|."""
-    dx, dy = step.T
-    length2 = dx * dx + dy * dy
-    side = sides_of(radius, step)
-    v = SUB * y - a[1]
-    along, across = (a[0] * dx)[shape] - dy[shape] * v, (a[0] * dy)[shape] + dx[shape] * v
-    first, last = runs_between(along, along + length2[shape], dx[shape])
-    begin, end = runs_between(across - side[shape], across + side[shape], dy[shape])
-    first, last = np.maximum(first, begin), np.minimum(last, end)
-    return _or_nothing(first, last, (first > last) | (length2 == 0)[shape])
+    length2, side = (step * step).sum(axis=1), sides_of(radius, step)
+    along = step.T.take(shape, axis=1)
+    low = along[::-1] * (SUB * y - a[1]) * [[-1], [1]]
+    low += a[0] * along - np.stack([0 * side, side]).take(shape, axis=1)
+    begin, end = runs_between(low, low + np.stack([length2, 2 * side]).take(shape, axis=1), along)
+    first, last = np.maximum(*begin), np.minimum(*end)
+    return _or_nothing(first, last, (first > last) | (length2 == 0).take(shape))
+
+
+def _add_discs(center: Ints, radius: int, shape: Ints, y: Ints, first: Ints, last: Ints) -> None:
+    """Extend runs in rows of shapes to the centres at most `radius` from a point (n, 2) of each."""
+    level = SUB * y - center[:, 1].take(shape)
+    near = (np.abs(level) <= radius).nonzero()[0]
+    x, level = center[:, 0].take(shape.take(near)), level.take(near)
+    half = isqrt(radius * radius - level * level)
+    begin, end = -((half - x) // SUB), (x + half) // SUB
+    filled = begin <= end
+    near = near[filled]
+    first[near], last[near] = np.minimum(first[near], begin[filled]), np.maximum(last[near], end[filled])
 
 
 def sides_of(radius: int, step: Ints) -> Ints:
@@ -188,31 +198,32 @@ def cones(reach: int, direction: Ints, c_half: int, s_half: int) -> RowRuns:
     With u = x c + y s and v = y c - x s: |v| c_half <= u s_half. Up to 90 degrees correctly rounded cosines fall and
     sines rise with the half angle, so a wider cone covers a narrower one.
     """
-    c, s = direction.T
-    axis = turned(np.array([[reach, 0]]), c, s)
-    low, high = _sector_ends(reach, c, s, c_half, s_half)
+    s, (cc, sc), (cs, ss) = direction[:, 1], (direction * c_half).T, (direction * s_half).T
+    one, other = sc - cs, sc + cs  # sines of the two sides
+    low, high = (end(end(one, other) >> TRIG_BITS, 0) for end in (np.minimum, np.maximum))
+    low, high = np.where(-s >= c_half, -ONE, low), np.where(s >= c_half, ONE, high)
+    low, high = (reach * low >> TRIG_BITS) - 1, (reach * high >> TRIG_BITS) + 2  # rounded outward
     shape, y = _ragged_rows((low - HALF) // SUB, -(-(high + HALF) // SUB))
-    parts = [_axis_rows(np.zeros(2, np.int64), axis, shape, y)]
+    parts = [_axis_rows(ORIGIN, scaled(direction, reach), shape, y)]
     if s_half or c_half < 0:
-        first, last = _disc_about(np.zeros(2, np.int64), reach, y)
-        sides = []
-        for sign in (1, -1):  # sign * v * c_half <= u * s_half  is  slope * x <= limit * y
-            slope, limit = -sign * s * c_half - c * s_half, s * s_half - sign * c * c_half
-            begin, end = _half_plane(slope, limit, shape, y)
-            sides.append((np.maximum(first, begin), np.minimum(last, end)))
-        (a_first, a_last), (b_first, b_last) = sides
+        # sign * v * c_half <= u * s_half  is  slope * x <= limit * y  with these, of both signs
+        begin, end = _half_plane(np.stack([-other, one]), np.stack([ss - cc, ss + cc]), shape, y)
+        half = _half_widths(reach, y)
         if c_half >= 0:
-            sides = [(np.maximum(a_first, b_first), np.minimum(a_last, b_last))]
-        parts += [_or_nothing(*side, side[0] > side[1]) for side in sides]
+            begin, end = np.maximum.reduce(begin, keepdims=True), np.minimum.reduce(end, keepdims=True)
+        begin, end = np.maximum(begin, -half), np.minimum(end, half)
+        parts += zip(*_or_nothing(begin, end, begin > end), strict=True)
     return RowRuns(shape, y, parts)
 
 
-def _sector_ends(reach: int, c: Ints, s: Ints, c_half: int, s_half: int) -> tuple[Ints, Ints]:
-    """Least and greatest y of sectors about the origin, rounded outward."""
-    one, other = s * c_half - c * s_half, s * c_half + c * s_half
-    low, high = (end(end(one, other) >> TRIG_BITS, 0) for end in (np.minimum, np.maximum))
-    low, high = np.where(-s >= c_half, -ONE, low), np.where(s >= c_half, ONE, high)
-    return (reach * low >> TRIG_BITS) - 1, (reach * high >> TRIG_BITS) + 2
+def _half_widths(radius: int, y: Ints) -> Ints:
+    """Last pixel of the disc about the origin in each of rows y; -1 in those that it does not meet.
+
+    Each row is computed once.
+    """
+    top = int(y.min(initial=0))
+    left = radius * radius - (SUB * np.arange(top, int(y.max(initial=0)) + 1)) ** 2
+    return np.where(left < 0, -1, isqrt(np.maximum(left, 0)) // SUB).take(y - top)
 
 
 def _axis_rows(a: Ints, step: Ints, shape: Ints, y: Ints) -> tuple[Ints, Ints]:
@@ -220,26 +231,6 @@ def _axis_rows(a: Ints, step: Ints, shape: Ints, y: Ints) -> tuple[Ints, Ints]:
     (dx, dy), (x0, y0) = np.ascontiguousarray(step.T), a.tolist()
     first, last = _thin_runs(x0, y0, dx, dy, shape, y)
     return _or_nothing(first, last, first > last)
-
-
-def _disc_rows(x: Ints, level: Ints, radius: int) -> tuple[Ints, Ints]:
-    """Runs of the centres at most `radius` from points at `x` (k,), in rows at `level` (k,) from them, 1/256 px."""
-    first, last = np.full(len(level), WIDEST), np.full(len(level), -WIDEST)
-    near = np.flatnonzero(np.abs(level) <= radius)
-    level, x = level[near], x[near]
-    half = isqrt(radius * radius - level * level)
-    first[near], last[near] = -((half - x) >> 8), (x + half) >> 8
-    none = near[first[near] > last[near]]
-    first[none], last[none] = WIDEST, -WIDEST
-    return first, last
-
-
-def _disc_about(center: Ints, radius: int, y: Ints) -> tuple[Ints, Ints]:
-    """Runs of the centres at most `radius` from one point (2,), in rows y; each row is computed once."""
-    top = int(y.min(initial=0))
-    row = np.arange(top, int(y.max(initial=0)) + 1)
-    first, last = _disc_rows(np.broadcast_to(center[0], row.shape), SUB * row - center[1], radius)
-    return first[y - top], last[y - top]
 
 
 def _or_nothing(first: Ints, last: Ints, none: Bools) -> tuple[Ints, Ints]:
@@ -270,24 +261,25 @@ def runs_between(low: Ints, high: Ints, slope: Ints) -> tuple[Ints, Ints]:
 
 
 def _half_plane(slope: Ints, limit: Ints, shape: Ints, y: Ints) -> tuple[Ints, Ints]:
-    """Runs of the centres with slope * x <= limit * y; both (n,) are below 2**62.
+    """Runs of the centres with slope * x <= limit * y; both (..., n) are below 2**62.
 
     Their quotient is computed in float64. Where that is so near to a whole number that its error could matter, Python's
     integers decide.
     """
-    ratio = limit.astype(np.float64) / np.where(slope == 0, 1, slope).astype(np.float64)
-    bound = ratio[shape] * y
-    near = np.rint(bound)
-    upper = (slope > 0)[shape]
-    whole = np.where(upper, np.floor(bound), np.ceil(bound)).clip(-WIDEST, WIDEST).astype(np.int64)
-    doubt = (np.abs(bound - near) <= np.abs(bound) * QUOTIENT_ERROR) & (y != 0) & (slope != 0)[shape]
-    for i in np.flatnonzero(doubt).tolist():
-        a, b = int(slope[shape[i]]), int(limit[shape[i]]) * int(y[i])
-        whole[i] = max(-WIDEST, min(b // a if a > 0 else -(b // -a), WIDEST))
+    level, upper = slope == 0, (slope > 0).take(shape, axis=-1)
+    per = np.where(level, 1, slope)
+    bound = (limit / per).take(shape, axis=-1) * y
+    whole = np.where(upper, np.floor(bound), np.ceil(bound))
+    whole = np.minimum(np.maximum(whole, -WIDEST), WIDEST).astype(np.int64)
+    doubt = np.abs(bound - np.rint(bound)) < np.abs(bound) * QUOTIENT_ERROR
+    for *side, i in zip(*(at.tolist() for at in doubt.nonzero()), strict=True):
+        of = *side, shape[i]
+        a, b = int(per[of]), int(limit[of]) * int(y[i])
+        whole[*side, i] = max(-WIDEST, min(b // a if a > 0 else -(b // -a), WIDEST))
     first, last = np.where(upper, -WIDEST, whole), np.where(upper, whole, WIDEST)
-    if not slope.all():
-        level = (slope == 0)[shape]
-        none = level & (limit[shape] * np.sign(y) < 0)
+    if level.any():
+        level = level.take(shape, axis=-1)
+        none = level & (limit.take(shape, axis=-1) * np.sign(y) < 0)
         first, last = _or_nothing(np.where(level, -WIDEST, first), np.where(level, WIDEST, last), none)
     return first, last
 
