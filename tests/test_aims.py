@@ -19,7 +19,7 @@ from hitplanes.planes.common.limits import REACH_MAX
 from hitplanes.planes.grid import fixed_point, rasterize
 from hitplanes.planes.grid.fixed_point import ONE, all_quarters, quarters, turned, unit, unit_toward
 from hitplanes.planes.grid.spans import Spans
-from hitplanes.weapons.kinds.areas import FEW_AIMS, AreaWeapon, pattern_of, patterns_of
+from hitplanes.weapons.kinds.areas import AreaWeapon, pattern_of, patterns_of
 from hitplanes.weapons.kinds.weapon import AimedTable, PatternTable, big_of, big_of_bits, columns_of
 
 STAR = Polygon([(0, 0), (50, 10), (30, 40), (20, 10)])
@@ -63,7 +63,7 @@ def directions(seed: int, count: int = 40) -> Any:
 def test_bit_rows_of_all_directions_are_those_of_each(name: str, jit: bool) -> None:
     weapon, direction = WEAPONS[name], directions(3 + jit, 12)  # those of a seed are kept
     patterns = patterns_of(weapon, direction)
-    assert isinstance(patterns, AimedTable) and len(patterns) == len(direction) > FEW_AIMS
+    assert isinstance(patterns, AimedTable) and len(patterns) == len(direction) > 1
     bits, begin = patterns.bits, 64
     for i, (c, s) in enumerate(direction.tolist()):
         spans = weapon.spans(c, s)
@@ -79,6 +79,27 @@ def test_bit_rows_of_all_directions_are_those_of_each(name: str, jit: bool) -> N
             across = spans.pixels() @ np.array([a, b])
             assert (low, high) == (across.min(), across.max())
     assert begin == len(bits.words) and not bits.words[:64].any()
+
+
+@pytest.mark.parametrize("name", WEAPONS)
+def test_a_pattern_alone_is_that_of_all_directions(name: str, jit: bool) -> None:
+    weapon, direction = WEAPONS[name], directions(5 + jit, 3)
+    for c, s in direction.tolist():
+        alone, pattern = patterns_of(weapon, np.array([[c, s]])), pattern_of(weapon, c, s)
+        big, own, bits, kept = alone.only_big(), big_of(pattern), alone.only_bits(), alone.bits
+        assert [getattr(big, field) for field in BIG] == [getattr(own, field) for field in BIG]
+        assert big.share(big.rows, pattern.spans.count) == own.share(own.rows, pattern.spans.count)
+        assert not len(bits.strips) and not len(pattern.table.only_bits().strips)
+        assert all(map(np.array_equal, bits[:4] + bits[5:], kept[:4] + kept[5:]))
+
+
+def test_a_pattern_alone_may_have_no_pixels(jit: bool) -> None:
+    for weapon in (Stencil([".."]), Polygon([(0.1, 0.2), (0.8, 0.3), (0.4, 0.7)])):
+        alone = patterns_of(weapon, np.array([[ONE, 0]]))
+        assert alone.only_big().rows == 0 and not alone.only_bits().words.any()
+
+
+BIG = ("x", "y", "wide", "high", "stride", "rows")
 
 
 def test_weights_of_integers_are_those_of_the_pattern_however_it_was_made(jit: bool) -> None:
@@ -381,8 +402,7 @@ def test_the_same_aims_are_rasterized_once() -> None:
     assert isinstance(first, AimedTable)
     assert patterns_of(Beam(77, 5), direction.copy()).bits is first.bits
     assert patterns_of(Beam(78, 5), direction).bits is not first.bits
-    few = patterns_of(Beam(77, 5), direction[:FEW_AIMS])
-    assert not isinstance(few, AimedTable) and few.patterns[0] is pattern_of(Beam(77, 5), *direction[0].tolist())
+    assert first.patterns[0] is pattern_of(Beam(77, 5), *direction[0].tolist())
     assert pattern_of(Beam(77, 5), ONE, 0).spans == Beam(77, 5).spans(ONE, 0)
 
 

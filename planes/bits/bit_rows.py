@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..common.checks import Bools, Ints
-from ..grid.spans import NO_STRIPS, Box, RowRuns, begins, meets_strip, ragged
+from ..grid.spans import NO_STRIPS, Box, RowRuns, Spans, begins, meets_strip, ragged
 
 Words = npt.NDArray[np.uint64]
 Sums = npt.NDArray[np.uint32]
@@ -107,6 +107,7 @@ WORDS_AT_ONCE = 2**16
 """Words of pairs worked on at a time: 512 KB; with fewer, calls take longer, with more, the caches overflow."""
 
 _FULL = np.uint64(2**64 - 1)
+PAST_LAST = np.array([[0], [1]])  # added to the first and last pixels of runs, makes them half-open
 
 
 class PatternBits(NamedTuple):
@@ -169,6 +170,26 @@ def bits_of_runs(runs: RowRuns, count: int, normal: Ints) -> PatternBits | None:
         low = np.minimum.reduceat(np.minimum(*ends) + across, begin)
         strips = np.stack([a, b, low, np.maximum.reduceat(np.maximum(*ends) + across, begin)], axis=1)
     return PatternBits(box, corner, rows, words, strips, NO_SUMS, np.zeros(len(box), np.int64))
+
+
+def columns_of(spans: Spans) -> Words:
+    """Words (columns of words, rows) of a pattern, with 63 empty pixels before it and 64 empty rows after its own."""
+    x, y, x_max, y_max = spans.box_xyxy or (0, 0, -1, -1)
+    columns = (WORD - 2 + x_max - x + 1) // WORD + 2
+    made = np.zeros((columns, y_max - y + 1 + WORD), np.uint64)
+    column = x - (WORD - 1) + WORD * np.arange(columns)
+    row = np.flatnonzero(np.diff(spans.y, prepend=y - 1))
+    if len(row):
+        runs = words_of(np.stack([spans.x_first, spans.x_last]), column)
+        made[:, spans.y[row] - y] = np.bitwise_or.reduceat(runs, row, axis=0).T
+    return made
+
+
+def words_of(ends: Ints, column: Ints) -> Words:
+    """Words (..., k, columns) of runs with first and last pixels (..., 2, k), given the columns of their bits 0."""
+    bits = (ends + PAST_LAST)[..., None] - column
+    shifted: Words = _FULL << np.minimum(np.maximum(bits, 0, out=bits), WORD, out=bits).view(np.uint64)
+    return shifted[..., 0, :, :] & ~shifted[..., 1, :, :]  # by 64 all is shifted out
 
 
 def _lay_runs(words: Words, at: Ints, step: Ints, first: Ints, last: Ints) -> None:

@@ -11,7 +11,7 @@ from weakref import ref
 
 import numpy as np
 
-from hitplanes.planes.common.backend import LruCache, jit_is_on, kernels_of
+from hitplanes.planes.common.backend import LruCache, kernels_of
 from hitplanes.planes.common.checks import InputError, Ints, choice, integer, kind_of, shown, suggestion, within
 from hitplanes.planes.common.limits import HALF, MASK_SIDE_MAX, PATTERN_CACHE_BYTES, PELLETS_MAX, REACH_MAX, SUB
 from hitplanes.planes.common.tables import Flag, Mask, Number, Numbers, Optional, Rows, Value, Whole, Word, typed
@@ -461,9 +461,6 @@ def is_directed(weapon: Weapon) -> bool:
     return ray is not None or (area is not None and area[2].directed)
 
 
-FEW_AIMS = 8
-"""Most directions whose patterns are made one by one."""
-
 FADING_MOST = 512
 """Longest reach, px, of patterns with weights that are made at once: the weights of all pixels around are needed."""
 
@@ -492,14 +489,10 @@ def pattern_of(weapon: AreaWeapon, c: int, s: int) -> Pattern:
 
 
 def patterns_of(weapon: AreaWeapon, direction: Ints) -> PatternTable:
-    """Patterns of a weapon along distinct directions (n, 2): of many only the bit rows are made, if its kind can.
-
-    Without compiled kernels a few are made one by one, because that is faster, and other calls may need some again.
-    """
+    """Patterns of a weapon along distinct directions (n, 2): only their bit rows are made, if its kind can."""
     weighted, reach = weapon.falloff is not None, -(-weapon.reach_256 // SUB)
     far = (weighted and reach > FADING_MOST) or not fits_at_reach(reach, weighted)
-    few = len(direction) <= FEW_AIMS and not jit_is_on()
-    if few or type(weapon).runs is AreaWeapon.runs or far:
+    if type(weapon).runs is AreaWeapon.runs or far:
         return PatternTable([pattern_of(weapon, c, s) for c, s in direction.tolist()])
     return AimedTable(weapon, direction, pattern_of)
 

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hitplanes.planes.bits import bit_rows
-from hitplanes.planes.bits.bit_rows import NO_SUMS, WORD, PatternBits, Sums, Words
+from hitplanes.planes.bits.bit_rows import NO_SUMS, WORD, PatternBits, Sums, Words, columns_of, words_of
 from hitplanes.planes.bits.span_walk import Runs
 from hitplanes.planes.bits.tiles import BigPattern, Depths, big_pattern, stride_of
 from hitplanes.planes.common.backend import LruCache, in_parts, jit_is_on, kernels_of
@@ -24,7 +24,7 @@ from hitplanes.planes.common.limits import MASK_AREA_MAX, REACH_MAX, SUB, WEIGHT
 from hitplanes.planes.common.tables import Number, Ref, Value
 from hitplanes.planes.grid import fixed_point
 from hitplanes.planes.grid.fixed_point import ONE
-from hitplanes.planes.grid.spans import Spans, Strip, ragged, strip_of, strips_of
+from hitplanes.planes.grid.spans import NO_STRIPS, WIDEST, RowRuns, Spans, Strip, ragged, strip_of, strips_of
 
 if TYPE_CHECKING:
     from .areas import AreaWeapon
@@ -278,6 +278,14 @@ class PatternTable:
         """Bit rows of all patterns; those of the last calls are kept."""
         return pattern_bits_of(self.patterns)
 
+    def only_big(self) -> BigPattern:
+        """The only pattern as integer rows."""
+        return self.bigs[0]
+
+    def only_bits(self) -> PatternBits:
+        """Bit rows of the only pattern, without its strip."""
+        return self.bits._replace(strips=NO_STRIPS)
+
     @cached_property
     def prefix(self) -> Ints | None:
         """Prefix sums of the weights of all patterns; None if all have full weight."""
@@ -368,14 +376,38 @@ class AimedTable(PatternTable):
         keys = ((self._weapon.text, direction.tobytes()) for direction in self._direction)
         return [_kept_bigs.get(key, lambda k=k: big_of_bits(self.bits, k)) for k, key in enumerate(keys)]  # type: ignore[misc]
 
+    def only_big(self) -> BigPattern:
+        """The only pattern as integer rows, which are not kept: a ready weapon keeps what it looks up."""
+        weapon, runs = self._weapon, self._weapon.runs(self._direction)
+        if runs is None:
+            return super().only_big()
+        big = big_of_runs(runs)
+        if weapon.falloff is None or not big.rows:
+            return big
+        box = np.array([(big.x, big.y, big.x + big.wide - 1, big.y + big.high - 1)])
+        return big.weighted(_sums_in(box, weapon.falloff, weapon.reach_256)[0])
+
+    def only_bits(self) -> PatternBits:
+        """Bit rows of the only pattern, without its strip, which are not kept."""
+        runs = self._weapon.runs(self._direction)
+        bits = None if runs is None else kernels_of(bit_rows).bits_of_runs(runs, 1, NO_NORMALS)
+        return super().only_bits() if bits is None else self._weighted(bits)
+
+    def _weighted(self, bits: PatternBits) -> PatternBits:
+        """Add the sums of weights along rows, if the weapon has a falloff."""
+        if self._weapon.falloff is None:
+            return bits
+        parts = _sums_in(bits.box_xyxy, self._weapon.falloff, self._weapon.reach_256)
+        size = np.array([part.size for part in parts])
+        return bits._replace(sums=_joined(parts), first_sum=np.cumsum(size) - size)
+
     def _rasterized(self) -> PatternBits:
         at_once = max(ROWS_AT_ONCE // self._side, 1)
         parts = list(chain(*in_parts(len(self), at_once if jit_is_on() else len(self), self._parts)))
         made = [part for part in parts if part is not None]
         if len(made) < len(parts):
             return _made(self.patterns)
-        bits, falloff = made[0] if len(made) == 1 else _one_after_another(made), self._weapon.falloff
-        return bits if falloff is None else _with_sums(bits, falloff, self._weapon.reach_256)
+        return self._weighted(made[0] if len(made) == 1 else _one_after_another(made))
 
     def _parts(self, first: int, last: int) -> list[PatternBits | None]:
         """Bit rows of patterns `first` .. `last` - 1, some at a time; None of those that must be made one by one."""
@@ -397,13 +429,11 @@ def _one_after_another(parts: Sequence[PatternBits]) -> PatternBits:
     return PatternBits(*map(np.concatenate, zip(*moved, strict=True)))
 
 
-def _with_sums(bits: PatternBits, falloff: str, reach_256: int) -> PatternBits:
-    """Add the sums of weights along rows; they depend on the place alone, so those of all patterns are of one table."""
+def _sums_in(boxes_xyxy: Ints, falloff: str, reach_256: int) -> list[Sums]:
+    """Sums of weights along the rows of boxes; they depend on the place alone, so those of all are of one table."""
     every = _kept_sums.get((falloff, reach_256), lambda: _sums_around(falloff, reach_256))
-    boxes = (bits.box_xyxy + len(every) // 2).tolist()
-    parts = [every[y : y_max + 1, x : x_max + 2].reshape(-1) for x, y, x_max, y_max in boxes]
-    size = np.array([part.size for part in parts])
-    return bits._replace(sums=_joined(parts), first_sum=np.cumsum(size) - size)
+    boxes = (boxes_xyxy + len(every) // 2).tolist()
+    return [every[y : y_max + 1, x : x_max + 2].reshape(-1) for x, y, x_max, y_max in boxes]
 
 
 def _sums_around(falloff: str, reach_256: int) -> Sums:
@@ -479,8 +509,6 @@ _kept_bigs: LruCache[ref[Pattern] | tuple[str, bytes], BigPattern] = LruCache(
     WINDOW_CACHE_BYTES, lambda big: big.nbytes + ENTRY_BYTES
 )
 
-_FULL = np.uint64(2**64 - 1)
-
 
 def _window_bytes(wide: int, high: int, weighted: bool) -> int:
     return 4 * weighted * high * (wide + 1) + 8 * (WORD + ((wide - 1) // WORD + 3) * (high + WORD))
@@ -525,6 +553,22 @@ def big_of_bits(bits: PatternBits, k: int) -> BigPattern:
     return big.weighted(bits.sums[bits.first_sum[k] :]) if len(bits.sums) else big
 
 
+def big_of_runs(runs: RowRuns) -> BigPattern:
+    """The runs of a single shape as integer rows."""
+    ends = np.asarray(runs.parts)
+    first, last, filled = ends[:, 0], ends[:, 1], ends[:, 0] <= ends[:, 1]
+    x, x_max = int(first.min(where=filled, initial=WIDEST)), int(last.max(where=filled, initial=-WIDEST))
+    if x > x_max:
+        return big_pattern(Spans.empty())
+    stride = stride_of(x_max - x + 1)
+    words: Words = np.bitwise_or.reduce(words_of(ends, x + WORD * np.arange(stride // WORD)), axis=0)
+    rows = int.from_bytes(words.astype("<u8", copy=False).tobytes(), "little")
+    empty = ((rows & -rows).bit_length() - 1) // stride  # rows before the first that has a pixel
+    y, rows = runs.y.item(0) + empty, rows >> empty * stride
+    high = (rows.bit_length() - 1) // stride + 1
+    return BigPattern(x, y, x_max - x + 1, high, stride, rows, Depths(rows, stride, x, y))
+
+
 def _made(patterns: Sequence[Pattern]) -> PatternBits:
     boxes = np.array([pattern.spans.box_xyxy or (0, 0, -1, -1) for pattern in patterns])
     strips = strips_of([pattern.strip for pattern in patterns], boxes)
@@ -554,17 +598,3 @@ def sums_along_rows(spans: Spans, prefix: Ints) -> Sums:
 def _pattern_words(pattern: Pattern) -> Words:
     """`columns_of` a pattern, kept for calls that have it together with other patterns."""
     return _kept_columns.get(ref(pattern), lambda: columns_of(pattern.spans))
-
-
-def columns_of(spans: Spans) -> Words:
-    """Words (columns of words, rows) of a pattern, with 63 empty pixels before it and 64 empty rows after its own."""
-    x, y, x_max, y_max = spans.box_xyxy or (0, 0, -1, -1)
-    columns = (WORD - 2 + x_max - x + 1) // WORD + 2
-    made = np.zeros((columns, y_max - y + 1 + WORD), np.uint64)
-    column = x - (WORD - 1) + WORD * np.arange(columns)
-    first, last = (np.clip(end[:, None] - column, 0, WORD).view(np.uint64) for end in (spans.x_first, spans.x_last + 1))
-    row = np.flatnonzero(np.diff(spans.y, prepend=y - 1))
-    if len(row):
-        runs = (_FULL << first) & ~(_FULL << last)  # by 64 all is shifted out
-        made[:, spans.y[row] - y] = np.bitwise_or.reduceat(runs, row, axis=0).T
-    return made

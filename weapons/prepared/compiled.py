@@ -69,7 +69,7 @@ ROW = 8
 
 ROW_BYTES, OUT = 8 * ROW, (Y + 1) * FEW_ROWS
 read = struct.Struct("8q").unpack_from
-NO_STRIPS, ZERO = np.zeros((0, 4), np.int64), np.zeros(1, np.int64)
+ZERO = np.zeros(1, np.int64)
 ACCEPT_ALL = NO_NUMBERS, NOBODY
 
 
@@ -242,7 +242,9 @@ BUFFERS: list[tuple[Any, memoryview]] = []
 
 def look(fired: Round) -> tuple[Look, int]:
     """Function that looks up what a round hits, and the bytes kept for it."""
-    shape, number, tell = _shape_of(fired), fired.number, OneShot.append
+    bits, alone = fired.pattern.only_bits(), (ZERO, ZERO)
+    shape = _shape(tuple(bits), *(alone if fired.pellets_xy is None else fired.pellets_xy.T))
+    number, tell = fired.number, OneShot.append
 
     def look(x: float, y: float, hits: OneShot) -> None:
         """Call the kernel and read its rows from a buffer."""
@@ -268,14 +270,7 @@ def look(fired: Round) -> tuple[Look, int]:
         BUFFERS.append(buffer)
 
     pellets = 0 if fired.pellets_xy is None else fired.pellets_xy.nbytes
-    return look, PIECE_BYTES + fired.pattern.bits.words.nbytes + fired.pattern.bits.sums.nbytes + pellets
-
-
-def _shape_of(fired: Round) -> Any:
-    """The Shape of a round."""
-    bits, alone = fired.pattern.bits, (ZERO, ZERO)
-    pellets = alone if fired.pellets_xy is None else fired.pellets_xy.T
-    return _shape(tuple(bits._replace(strips=NO_STRIPS)), *pellets)
+    return look, PIECE_BYTES + bits.words.nbytes + bits.sums.nbytes + pellets
 
 
 @structref.register

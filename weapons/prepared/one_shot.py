@@ -85,7 +85,7 @@ def reach_of(weapon: Weapon) -> int | None:
 
 
 def rounds_of(weapon: Weapon, shot: Shots, offset_256: tuple[int, int] | None) -> list[Round]:
-    """Rounds that have pixels, of a shot at the origin that is aimed toward an offset, if one is given."""
+    """Rounds of a shot at the origin that is aimed toward an offset, if one is given."""
     if offset_256 is not None:
         shot = shot.aimed(toward(*offset_256))
     burst, spread, plain = parts_of(weapon)
@@ -93,13 +93,11 @@ def rounds_of(weapon: Weapon, shot: Shots, offset_256: tuple[int, int] | None) -
         pattern, drawn = distinct_patterns(plain, shot.one_direction or STRAIGHT)[0], None
         if spread is not None:
             drawn = pellets_of(spread, shot.seed, shot.number, ORIGIN[:, 0])[0]
-        rounds = [Round(0, 0, 0, pattern, drawn)]
-    else:
-        placements = placements_for(weapon, shot)
-        patterns: list[Pattern] = [placements.table.patterns[kind] for kind in placements.pattern.tolist()]
-        places = enumerate(placements.turn_xy.tolist())
-        rounds = [Round(x, y, number, patterns[number].table) for number, (x, y) in places]
-    return [each for each in rounds if each.pattern.box_xyxy[0, 0] <= each.pattern.box_xyxy[0, 2]]
+        return [Round(0, 0, 0, pattern, drawn)]
+    placements = placements_for(weapon, shot)
+    patterns: list[Pattern] = [placements.table.patterns[kind] for kind in placements.pattern.tolist()]
+    places = enumerate(placements.turn_xy.tolist())
+    return [Round(x, y, number, patterns[number].table) for number, (x, y) in places]
 
 
 ORIGIN: Ints = np.zeros((1, 2), np.int64)

@@ -171,7 +171,7 @@ class GroundCache:
 # house: way of areas
 def look(fired: Round) -> tuple[Look, int]:
     """Function that looks up what a round hits, and the bytes kept for it."""
-    plain, number, tell = fired.pattern.bigs[0], fired.number, OneShot.append
+    plain, number, tell = fired.pattern.only_big(), fired.number, OneShot.append
     pattern = plain if fired.pellets_xy is None else scattered(plain, fired.pellets_xy)
     share, counted = pattern.share, pattern.counted
     stride, rows, nearest = pattern.stride, pattern.rows, pattern.depths.nearest
