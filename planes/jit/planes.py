@@ -446,7 +446,7 @@ def _within(place, step, size, near, far):
     if step == 0:
         return (near, far) if 0 <= place <= most else (near, near)
     first, last = float(-place) / float(step), float(most - place) / float(step)
-    near = max(near, np.int64(np.ceil(min(first, last))))
+    near = min(max(near, np.int64(np.ceil(min(first, last)))), far)
     return near, max(min(far, np.int64(np.floor(max(first, last))) + 1), near)
 
 
@@ -467,7 +467,10 @@ def _map(flat, frame, first, step, unit, size_wh, held):
         place_x, place_y = first_x + y * row_x, first_y + y * row_y
         near, far = _within(place_x, step_x, wide, 0, width)
         near, far = _within(place_y, step_y, high, near, far)
-        row[:] = False
+        for x in range(near):
+            row[x] = False
+        for x in range(far, width):
+            row[x] = False
         place_x, place_y = place_x + near * step_x, place_y + near * step_y
         for x in range(near, far):
             if place_x & rest < 2 * DOUBT or place_y & rest < 2 * DOUBT:
@@ -503,8 +506,9 @@ def _turned_masks(flat, frames, which, first, step, unit, size_wh):
         boxes[n, 0], boxes[n, 1], boxes[n, 2], boxes[n, 3], boxes[n, 4], boxes[n, 5] = left, top, wide, high, area, used
         for y in range(top, top + high):
             begin = y * size_wh[n, 0] + left
+            source, row = held[begin : begin + wide], out[used : used + wide]
             for k in range(wide):
-                out[used + k] = held[begin + k]
+                row[k] = source[k]
             used += wide
     return boxes, out
 
