@@ -155,7 +155,8 @@ class PastItems(Items):
     def _known(self) -> tuple[Ints, Ints]:
         return self._snapshot.table.known
 
-    def _boxes_in_order(self, rows: Ints) -> Ints:
+    def deciding_boxes(self, rows: Ints) -> Ints:
+        """Boxes of items that decide hits."""
         return self.boxes(rows)
 
     def turn(self, angles: Mapping[int, float]) -> None:

@@ -381,15 +381,21 @@ class Items:
 
     def _record(self, rows: Ints, columns: Iterable[str]) -> None:
         """`record` of changes that the version counts already."""
-        before, after = self._box[rows], self.deciding_boxes(rows)
-        low = HALF - self.pivot_256[rows]
-        self._edge[rows] = np.concatenate([low, low + SUB * (after[:, 2:] - after[:, :2])], axis=1)
-        self._box[rows] = after
+        before, edge = self._box.take(rows, axis=0), self._edges(rows)
+        after = boxes_at(self.position_256.take(rows, axis=0), edge)
+        self._edge[rows], self._box[rows] = edge, after
         if not UNARRANGED.issuperset(columns):
             self.arrangement = next(ARRANGEMENTS)
             same = (before[:, 0] <= before[:, 2]) == (after[:, 0] <= after[:, 2])
             self._in_order &= ORDERING.isdisjoint(columns) and bool(same.all())
         self._note(rows, before, after, len(rows))
+
+    def _edges(self, rows: Ints) -> Ints:
+        """The columns of `_edge` of items; the boxes of those that decide no hit are empty."""
+        size, role = self.size_wh.take(rows, axis=0), self.role.take(rows)
+        size[(role != HITTABLE) & (role != OCCLUDER)] = 0
+        low = HALF - self.pivot_256.take(rows, axis=0)
+        return np.concatenate([low, low + SUB * (size - 1)], axis=1)
 
     def move(self, rows: Ints, position_256: Ints) -> None:
         """Move distinct items (n,) to new positions (n, 2); masks and order stay."""
@@ -475,10 +481,7 @@ class Items:
 
     def deciding_boxes(self, rows: Ints) -> Ints:
         """`boxes`, but empty for items that decide no hit: planes need not follow their changes."""
-        boxes = self.boxes(rows)
-        role = self.role[rows]
-        boxes[(role != HITTABLE) & (role != OCCLUDER)] = NOWHERE
-        return boxes
+        return self._box.take(rows, axis=0)
 
     def settled(self) -> tuple[MaskAtlas, Stack | None]:
         """The atlas, rebuilt if too much of it is unused, and the last stack, whose order may be an earlier one."""
@@ -508,12 +511,12 @@ class Items:
     def _stack_after(self, last: Stack | None) -> Stack:
         """The stack of the present version; it shares unchanged columns with the last one."""
         if last is not None and last.arrangement == self.arrangement:
-            return last.placed(self._boxes_in_order(last.rows))
+            return last.placed(self.deciding_boxes(last.rows))
         if last is None or not self._in_order:
             return self.stack_of(*DECIDING)
         rows = last.rows
         return last.reformed(
-            arrangement=self.arrangement, box_xyxy=self._boxes_in_order(rows), offset=self.offset.take(rows),
+            arrangement=self.arrangement, box_xyxy=self.deciding_boxes(rows), offset=self.offset.take(rows),
             atlas=self.atlas, categories=self._filtered_by(rows, last.occluder), owner=self.owner.take(rows),
         )  # fmt: skip
 
@@ -521,10 +524,6 @@ class Items:
         """Categories of a stack's items."""
         bits: Ints = self.categories.take(rows) << CATEGORY_BITS * occluder
         return bits
-
-    def _boxes_in_order(self, rows: Ints) -> Ints:
-        """Boxes of all items that decide hits."""
-        return self._box.take(rows, axis=0)
 
     def stack_of(self, *roles: Role) -> Stack:
         """Items of some roles, front to back."""

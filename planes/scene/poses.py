@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeGuard
 
 import numpy as np
 
@@ -56,6 +57,11 @@ def place_256(field: str, xy: object, limit: float) -> tuple[int, int]:
     return place
 
 
+def is_angle(value: object) -> TypeGuard[float]:
+    """Whether a value is a valid angle as it stands; others are checked as arrays, valid or not."""
+    return type(value) is float and math.isfinite(value)
+
+
 def scale_pair(scale: object) -> tuple[float, float]:
     """Check a scale, one number or (sx, sy), and return the pair."""
     if type(scale) is float:
@@ -83,7 +89,7 @@ class Looks(NamedTuple):
         if sprite is not None:
             sprites = _sprite_rows(sprite, n)
         if angle is not None:
-            angles = reals("angle", each("angle", angle, n), (n,)).tolist()
+            angles = [angle] * n if is_angle(angle) else reals("angle", each("angle", angle, n), (n,)).tolist()
         if angle is not None or sprite is not None:
             turns = all_quarter_turns([sprite.stepped(angle) for sprite, angle in zip(sprites, angles, strict=True)])
         if scale is not None:

@@ -515,6 +515,8 @@ class Scene:
         if risen is not None:
             return risen
         rows = self._living(ids)
+        if len(rows) < 2:
+            return rows
         ordered = np.sort(rows)
         if (ordered[1:] == ordered[:-1]).any():
             again = np.setdiff1d(np.arange(len(rows)), np.unique(rows, return_index=True)[1])

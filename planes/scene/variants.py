@@ -460,11 +460,12 @@ def resample(planes: Bools, which: Ints, first: Ints, step: Ints, unit: Ints, si
     """
     _, rows, columns = planes.shape
     first = first + unit
-    (column, beside), (row, above) = (_rounded(first[:, k], step[:, k], unit[:, k], size_wh) for k in (0, 1))
-    near = np.flatnonzero(np.minimum(beside, above, out=above) == 0)
-    source = np.clip(row, 0, rows - 1, out=row).astype(np.int64)
+    place, near = _rounded(first.T[..., None], step.T[..., None], unit.T[..., None], size_wh)
+    np.maximum(place, 0, out=place)
+    column, row = place
+    source: Ints = np.minimum(row, rows - 1, out=row).astype(np.int64)
     source *= columns
-    source += np.clip(column, 0, columns - 1, out=column)
+    source += np.minimum(column, columns - 1, out=column)
     if len(planes) > 1:
         source += (which * (rows * columns))[:, None, None]
     if len(near):
@@ -474,21 +475,26 @@ def resample(planes: Bools, which: Ints, first: Ints, step: Ints, unit: Ints, si
     return source
 
 
-def _rounded(first: Ints, step: Ints, unit: Ints, size_wh: tuple[int, int]) -> tuple[Ints32, Ints32]:
-    """Columns (n, height, width) of a frame at centres, and 0 for those that may be wrong or on a border.
+def _rounded(first: Ints, step: Ints, unit: Ints, size_wh: tuple[int, int]) -> tuple[Ints32, Ints]:
+    """Columns and rows (2, n, height, width) of frames at centres; and the centres where these may be wrong or borders.
 
     Both summands are rounded down, so their sum is too small by less than 2 in its last bit.
+
+    Parameters
+    ----------
+    first, step, unit : (2, n, 1), (2, 2, n, 1) and (2, n, 1), with the axes of `Grids` first, in reverse
     """
     width, height = size_wh
-    along = (first[:, None] + step[:, 0, None] * np.arange(width)) / unit[:, None]
-    over = step[:, 1, None] * np.arange(height) / unit[:, None]
+    along, over = (first + step[0] * np.arange(width)) / unit, step[1] * np.arange(height) / unit
     reach = int(np.abs(along).max() + np.abs(over).max())
     bits = 30 - reach.bit_length()
-    along, over = (np.floor(places * (1 << bits)) for places in (along, over))
-    place = (over + 2).astype(np.int32)[:, :, None] + along.astype(np.int32)[:, None]
+    along, over = (np.floor(places * (1 << bits)).astype(np.int32) for places in (along, over))
+    over += 2
+    place = over[..., None] + along[:, :, None]
     rest = place & np.int32((1 << bits) - 4)
+    near = np.flatnonzero(np.minimum(rest[0], rest[1], out=rest[0]) == 0)
     place >>= bits
-    return place, rest
+    return place, near
 
 
 def _at_borders(planes: Bools, which: Ints, place: Ints, unit: Ints) -> Ints:
