@@ -30,6 +30,7 @@ from hitplanes import (
     Scene,
     Spread,
     Sprite,
+    Sweep,
     Weapon,
     fire,
     prepare,
@@ -37,7 +38,7 @@ from hitplanes import (
 )
 from hitplanes.planes.common.backend import kernels_of
 from hitplanes.planes.grid.fixed_point import unit, unit_of
-from hitplanes.weapons.prepared.prepared_ray import OneShotOfRays, ReadyRay, ReadySpread
+from hitplanes.weapons.prepared.prepared_ray import OneShotOfRays, ReadyRay, ReadyRays
 from hitplanes.weapons.rays import one_ray, raycast
 from hitplanes.weapons.rays.contacts import NEVER
 from hitplanes.weapons.rays.one_ray import Ray, WideRay
@@ -118,19 +119,22 @@ def test_a_crowd(kernels: ModuleType, weapon: Weapon, exclude: object, bounded: 
     assert 12 < rows < (72 if weapon.hits_most == 1 else 300) and alone > 60  # type: ignore[attr-defined]
 
 
-SPREADS: list[Weapon] = [
+SEVERAL: list[Weapon] = [
     Spread(Pistol(150), 8, 9), Spread(Pistol(90, falloff="linear"), 32, 14), Spread(Pistol(120, width=5), 5, 6),
     Spread(Rifle(120, max_hits=1), 3, 0.5), Spread(Pistol(90, inside="ignore_until_exit"), 4, 8),
+    Rounds(Pistol(120), 5, (-7.3, 4.6), 11), Rounds(Pistol(90, falloff="smooth"), 3, recoil_xy=(0.5, 9)),
+    Rounds(Spread(Pistol(120), 4, 9), 3, (3.1, -2), -20), Rounds(Sweep(Pistol(90), 40, 3), 4, recoil_deg=35),
+    Sweep(Pistol(120), 90, 5), Sweep(Pistol(90, falloff="linear", width=3), 360, 8),
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("weapon", some_of(SPREADS, 2), ids=repr)
+@pytest.mark.parametrize("weapon", some_of(SEVERAL, 2), ids=repr)
 @pytest.mark.parametrize("bounded", [True, False])
-def test_a_spread_of_a_few_rays(kernels: ModuleType, weapon: Weapon, bounded: bool) -> None:
-    """Pellets that hit the same object are one row, that of the nearest; so is a pixel that several of them hit."""
+def test_a_shot_of_a_few_rays(kernels: ModuleType, weapon: Weapon, bounded: bool) -> None:
+    """Rays that hit the same object are one row of a round, that of the nearest; so is a pixel that several hit."""
     scene, rng = crowd(7, (220, 160) if bounded else None), np.random.default_rng(3)
     ready, rows, alone = prepare(scene, weapon, exclude=[1, 4], seed=3), 0, 0
-    assert type(ready) is ReadySpread
+    assert type(ready) is ReadyRays
     for step in range(3):
         for k in range(24):
             at = tuple((rng.integers(-20 * 256, 240 * 256, 2) / 256).tolist())
@@ -140,10 +144,21 @@ def test_a_spread_of_a_few_rays(kernels: ModuleType, weapon: Weapon, bounded: bo
             truth = fire(scene, weapon, at, exclude=[1, 4], seed=3, strategy="walk", **shot)
             same(got, truth)
             assert got.rays == truth.rays and got.passes == truth.passes and got.stop == truth.stop
-            rows += sum(row.pellets > 1 for row in got)
+            rows += sum(row.pellets > 1 for row in got) if weapon.kind == "spread" else len(got)
         scene.move(scene.ids()[step::5], rng.uniform((0, 0), (220, 160), (8, 2)))
-    is_alone = kernels is not raycast or weapon.count < 6  # type: ignore[attr-defined]
+    is_alone = kernels is not raycast or ready.rays < 6
     assert rows > 10 and (alone > 40 or not is_alone)  # in numpy more rays are followed together
+
+
+def test_a_burst_of_rays_that_end_where_they_are_aimed_turns_about_its_start(kernels: ModuleType) -> None:
+    scene, weapon = crowd(7, None), Rounds(Pistol(None), 4, (3.5, -2), 9)
+    ready, rows = prepare(scene, weapon), 0
+    for toward in np.random.default_rng(5).uniform((0, 0), (220, 160), (12, 2)):
+        got = ready.fire((110.0, 80.0), toward=tuple(toward.tolist()))
+        assert type(got) is OneShotOfRays
+        same(got, fire(scene, weapon, (110.0, 80.0), toward=toward, strategy="walk"))
+        rows += len(got)
+    assert rows > 20
 
 
 @pytest.mark.parametrize("weapon", [Spread(Pistol(9), 8, 2), Spread(Pistol(9, falloff="linear"), 8, 2)], ids=str)
@@ -375,7 +390,7 @@ def test_positions_of_any_kind(kernels: ModuleType, at: object) -> None:
 
 @pytest.mark.parametrize("weapon", [
     Projectile(90, 3, steps=4), Projectile(0, 9),
-    Rounds(Pistol(90), 2), Spread(Laser(90), 3, 4), Spread(Pistol(90), 33, 4), Rounds(Spread(Pistol(90), 3, 4), 2),
+    Rounds(Laser(90), 2), Spread(Laser(90), 3, 4), Spread(Pistol(90), 33, 4), Rounds(Spread(Pistol(90), 11, 4), 3),
 ], ids=repr)  # fmt: skip
 def test_other_weapons_of_rays_go_the_way_of_fire(weapon: Weapon) -> None:
     scene = crowd(3)

@@ -23,11 +23,11 @@ from ..fire.call import fired
 from ..fire.plan import Plan
 from ..fire.spans import context_of, direct
 from ..fire.strategy import AUTO
-from ..kinds.areas import parts_of
+from ..kinds.areas import RayParts, parts_of, rays_in
 from ..kinds.placements import Shots, placements_for
 from ..kinds.rays import Pistol
 from ..kinds.weapon import Weapon
-from ..rays.contacts import Parts, Reason, rays_each
+from ..rays.contacts import Reason
 
 Shifts = npt.NDArray[Any]
 """Shifts (n, 2), px."""
@@ -99,7 +99,7 @@ def pattern_margins(scene: Scene, stack: Stack, weapon: Weapon, shot: Shots, num
     return _margins(hit_at, PATTERN_SHIFTS, step, stack, number)
 
 
-def ray_margins(scene: Scene, parts: Parts, shot: Shots, number: int) -> list[Margin]:
+def ray_margins(scene: Scene, parts: RayParts, shot: Shots, number: int) -> list[Margin]:
     """Margins of the objects that a shot of rays comes to hit, or no longer hits, if all its rays are shifted together.
 
     A shift is passed over if the shot cannot be fired there, because it starts inside an item and its weapon forbids
@@ -108,7 +108,7 @@ def ray_margins(scene: Scene, parts: Parts, shot: Shots, number: int) -> list[Ma
     An InputError says if there are too many rays.
     """
     burst, _, ray = parts
-    rays = rays_each(parts)
+    rays = rays_in(parts)
     if rays > RAYS_MAX:
         raise InputError(f"shot: expected one of at most {RAYS_MAX} rays, got {rays}")
     stack, shifts = scene.items.stack(), RAY_SHIFTS if rays <= FINE_RAYS else PATTERN_SHIFTS.astype(np.float64)

@@ -21,8 +21,9 @@ from hitplanes.planes.scene.scene import Scene
 
 from ..fire.plan import Plan
 from ..fire.prefilter import Candidates, refused
+from ..kinds.areas import RayParts
 from ..kinds.placements import Shots
-from ..rays.contacts import Contacts, Parts, Rays, Reason, Terminations, cells_hit, rays_of, steps_of
+from ..rays.contacts import Contacts, Rays, Reason, Terminations, cells_hit, rays_of, steps_of
 from ..rays.ray_walk import Range, touching, trace
 from .samples import Behind, Blocked, Samples, WhyNot, pixels_in, unmet
 
@@ -180,7 +181,7 @@ def _back_to_front(met: Contacts) -> tuple[Ints, Ints, Ints, Ints]:
     return met.ray[pair], met.x[order], met.y[order], met.rank[pair]
 
 
-def ray_detail(scene: Scene, parts: Parts, shots: Shots) -> RayDetail:
+def ray_detail(scene: Scene, parts: RayParts, shots: Shots) -> RayDetail:
     """Walk shots cell by cell."""
     stack, rays = scene.items.stack(), rays_of(parts, shots)
     through = Range(scene.items, stack, scene.bounds, Candidates(scene.items, stack), Plan(), whole=True)
@@ -190,7 +191,7 @@ def ray_detail(scene: Scene, parts: Parts, shots: Shots) -> RayDetail:
     return RayDetail(stack, scene.bounds, shots, rays, lines, ends, met, every, relative.scale, *rules)
 
 
-def counted_verdicts(scene_of: Callable[[int], Scene], parts: Parts, shots: Shots) -> Ints:
+def counted_verdicts(scene_of: Callable[[int], Scene], parts: RayParts, shots: Shots) -> Ints:
     """Number of cells (N, 6) of shots by verdict, each at the scene that it was fired at; many are walked at a time."""
     counts = [np.zeros((0, len(Verdict)), np.int64)]
     rays = rays_of(parts, shots)
@@ -220,7 +221,7 @@ def pixels_of_rays(detail: RayDetail) -> dict[tuple[int, int], Spans]:
     return found
 
 
-def object_cells(scene: Scene, parts: Parts, shots: Shots) -> Iterator[tuple[int, Spans]]:
+def object_cells(scene: Scene, parts: RayParts, shots: Shots) -> Iterator[tuple[int, Spans]]:
     """Pixels that shots hit, as (object, pixels); many shots are walked at a time."""
     rays = rays_of(parts, shots)
     each = np.bincount(rays.shot, _cells_most(rays, parts[2].radius_256), len(shots)).astype(np.int64)

@@ -396,11 +396,11 @@ class Rounds(Weapon, Generic[Repeated]):
 Rays = RayWeapon | Sweep | Spread[RayWeapon] | Rounds[RayWeapon | Sweep | Spread[RayWeapon]]
 """Weapons of rays, for type checkers: `fire` answers them with `RayHits`."""
 
-Parts = tuple[
-    tuple[Rounds[Any] | None, Spread[Any] | None, AreaWeapon] | None,
-    tuple[Rounds[Any] | None, Spread[Any] | Sweep | None, RayWeapon] | None,
-]
-"""Burst, spread and pattern of an area weapon, or None; burst, spread or sweep, and ray of a ray weapon, or None."""
+RayParts = tuple[Rounds[Any] | None, Spread[Any] | Sweep | None, RayWeapon]
+"""Burst, spread or sweep, and ray of a ray weapon."""
+
+Parts = tuple[tuple[Rounds[Any] | None, Spread[Any] | None, AreaWeapon] | None, RayParts | None]
+"""Burst, spread and pattern of an area weapon, or None; and those of a ray weapon, or None."""
 
 KINDS: dict[str, type[Weapon]] = {
     kind.kind: kind
@@ -424,12 +424,18 @@ def ray_parts_of(weapon: Weapon) -> tuple[Rounds[Any] | None, Spread[Any] | Swee
     return _parts_of(weapon)[1]
 
 
-def are_followed(parts: tuple[Rounds[Any] | None, Spread[Any] | Sweep | None, RayWeapon]) -> bool:
-    """Whether a ready shot follows its rays one by one: one ray, or a few of a spread that end at their first hit."""
+def rays_in(parts: RayParts) -> int:
+    """Number of rays of a shot."""
+    burst, several, _ = parts
+    return (burst.count if burst else 1) * (several.count if several else 1)
+
+
+def are_followed(parts: RayParts) -> bool:
+    """Whether a ready shot follows its rays one by one: a single ray, or a few that end at their first hit."""
     burst, several, ray = parts
-    if burst is not None or is_stepped(ray):
-        return False
-    return several is None or (isinstance(several, Spread) and several.count <= FOLLOWED_MOST and ends_at_first(ray))
+    if burst is None and several is None:
+        return not is_stepped(ray)
+    return rays_in(parts) <= FOLLOWED_MOST and ends_at_first(ray)
 
 
 def _parts_of(weapon: object) -> Parts:

@@ -20,7 +20,7 @@ from hitplanes.planes.scene.scene import Scene
 
 from ..fire.call import category_bits, check_owners, fire_anew
 from ..fire.hits import Hits
-from ..kinds.areas import Rays, Spread, are_followed, parts_of, ray_parts_of
+from ..kinds.areas import Rays, are_followed, parts_of, ray_parts_of
 from ..kinds.placements import accepted_of, blocking_of, checked_filter, checked_owners, checked_seeds
 from ..kinds.weapon import Weapon
 from . import position_cache
@@ -67,10 +67,10 @@ class Ready(Generic[AnyHits]):
     Every shot compares versions. If the scene has changed, all that was looked up is discarded first, so that no answer
     is of an older scene. The choice between numpy and compiled kernels is made at the same time.
 
-    Patterns of up to 1000 px are looked up; weapons of one ray are cast, and spreads of a few rays that end at their
-    first hit (see `prepared_ray`). These are left to `fire`:
+    Patterns of up to 1000 px are looked up; weapons of one ray are cast, and bursts, spreads and sweeps of a few rays
+    that end at their first hit (see `prepared_ray`). These are left to `fire`:
 
-    - sweeps, bursts and other spreads of rays, and rays that must walk (see `prepared_ray`)
+    - other weapons of several rays, and rays that must walk (see `prepared_ray`)
     - weapons with a line of sight; spreads with a falloff, of many or far pellets, and bursts of spreads
     - larger patterns, and in numpy large patterns near which there are many items
     - bursts whose recoil is not a whole number of pixels
@@ -328,12 +328,10 @@ def prepare(
     if parts is not None:
         if not are_followed(parts):
             return Ready(scene, weapon, kept)
-        from .prepared_ray import ReadyRay, ReadySpread
+        from .prepared_ray import ReadyRay, ReadyRays
 
-        _, several, ray = parts
-        if isinstance(several, Spread):
-            return ReadySpread(scene, weapon, kept, ray, several)
-        return ReadyRay(scene, weapon, kept, ray)
+        single = parts[:2] == (None, None)
+        return ReadyRay(scene, weapon, kept, parts[2]) if single else ReadyRays(scene, weapon, kept, parts)
     reach = reach_of(weapon)
     return Ready(scene, weapon, kept) if reach is None else ReadyPattern(scene, weapon, kept, reach)
 

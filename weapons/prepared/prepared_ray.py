@@ -17,7 +17,7 @@ from hitplanes.planes.bits.bit_rows import row_order
 from hitplanes.planes.common.backend import cached_attribute, kernels_of
 from hitplanes.planes.common.checks import Ints
 from hitplanes.planes.common.limits import HALF, POSITION_MAX, REACH_MAX, SUB, WEIGHT_FULL
-from hitplanes.planes.grid.fixed_point import over_one, pixel, toward, unit_of
+from hitplanes.planes.grid.fixed_point import over_one, pixel, snap, toward, unit_of
 from hitplanes.planes.grid.rasterize import Lines
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
@@ -25,9 +25,9 @@ from hitplanes.planes.scene.scene import Scene
 from .. import late
 from ..fire.hits import HitRow
 from ..fire.prefilter import filters_of
-from ..kinds.areas import Spread
+from ..kinds.areas import RayParts, Spread, rays_in
 from ..kinds.placements import STRAIGHT, ZEROS, pellets_of
-from ..kinds.rays import RayWeapon, unspent
+from ..kinds.rays import RayWeapon, Sweep, unspent
 from ..kinds.weapon import Weapon
 from ..rays import raycast
 from ..rays.contacts import NEVER, Rays, Touches, endless, rays_of
@@ -114,29 +114,36 @@ class ReadyRay(Ready[RayHits]):
         place, target = plain_pair(at), None if toward is None else plain_pair(toward)
         angle, number = plain_number(aim), plain_number(shot)
         numbered = number is None or (type(number) is int and 0 <= number < 2**63)
-        step = self._step(place, angle, target) if place and numbered and (target or toward is None) else None
-        if place is None or step is None:
+        ahead = self._ahead(place, angle, target) if place and numbered and (target or toward is None) else None
+        if place is None or ahead is None:
             return Ready.fire(self, at, aim, toward, shot)
         hits: OneShotOfRays = OneShotOfRays()
         hits._present, hits._at, hits._arguments = self._present, place, (angle, target, number)
-        if self._answered(hits, (round(SUB * place[0]), round(SUB * place[1])), step):
+        if self._answered(hits, (round(SUB * place[0]), round(SUB * place[1])), ahead):
             return hits
         return Ready.fire(self, at, aim, toward, shot)
 
-    def _answered(self, hits: OneShotOfRays, start: Vector, step: Vector) -> bool:
+    def _answered(self, hits: OneShotOfRays, start: Vector, ahead: Vector) -> bool:
         """Add the rows of a shot to its answer; False if it is left to `fire`."""
+        step = self._scaled(ahead)
         followed = (self._follows or self._chosen())(*start, *step)
         if followed is None or self._must_walk(*followed):
             return False
         found = followed[1]
         if self._budget_256 and self._may_spend(found, self._budget_256):
             found = self._before_spent(start, step, self._budget_256, followed)
+        self._add_of_one(hits, 0, start, step, found)
+        return True
+
+    def _add_of_one(
+        self, hits: OneShotOfRays, round_: int, start: Vector, step: Vector, found: list[list[int]]
+    ) -> None:
+        """Add rows of what the only ray of a round hits, as in `Followed`."""
         for rank, count, x, y, entry in found:
             column, row = x - ((start[0] + HALF) >> 8), y - ((start[1] + HALF) >> 8)
             weight = WEIGHT_FULL if self._fades is None else self._weight(step, entry)
-            columns = 0, 0, self._ids[rank], count, count, weight, 1, (x, y), column * column + row * row
+            columns = 0, round_, self._ids[rank], count, count, weight, 1, (x, y), column * column + row * row
             hits.append(new(HitRow, columns))
-        return True
 
     def _must_walk(self, end: int, found: list[list[int]]) -> bool:
         """Whether a ray that was cast to its end begins in an item that is not hit, or with a budget of 0."""
@@ -167,11 +174,11 @@ class ReadyRay(Ready[RayHits]):
         if self._items.version != self._version:
             self._follow()
         place, goal = plain_pair(at), plain_pair(target)
-        step = self._step(place, None, goal) if place and goal else None
-        if place is None or step is None:
+        ahead = self._ahead(place, None, goal) if place and goal else None
+        if place is None or ahead is None:
             return None
         follow = self._follows or self._chosen()
-        followed = follow(round(SUB * place[0]), round(SUB * place[1]), *step)
+        followed = follow(round(SUB * place[0]), round(SUB * place[1]), *self._scaled(ahead))
         return None if followed is None else followed[0] == NEVER
 
     def _chosen(self) -> Follow:
@@ -181,20 +188,23 @@ class ReadyRay(Ready[RayHits]):
             self._follows = follow
         return follow
 
-    def _step(self, place: Pair, aim: Any, target: Pair | None) -> tuple[int, int] | None:
-        """Vector from the start of a shot to its end, 1/256 px; None if an argument must be checked by `fire`."""
+    def _ahead(self, place: Pair, aim: Any, target: Pair | None) -> Vector | None:
+        """Direction of a shot, or the vector to where it is aimed, if it ends there; None if `fire` must check it."""
         if target is None:
             if self._length is None or not (aim is None or (type(aim) in PLAIN and abs(aim) <= POSITION_MAX)):
                 return None
-            c, s = STRAIGHT if aim is None else unit_of(float(aim))
-            return over_one(c * self._length), over_one(s * self._length)
+            return STRAIGHT if aim is None else unit_of(float(aim))
         dx, dy = (round(SUB * to) - round(SUB * at) for to, at in zip(target, place, strict=True))
         if aim is not None or dx == 0 == dy:
             return None
         if self._length is None:
             return (dx, dy) if max(abs(dx), abs(dy)) <= SUB * REACH_MAX else None
-        c, s = toward(dx, dy)
-        return over_one(c * self._length), over_one(s * self._length)
+        return toward(dx, dy)
+
+    def _scaled(self, ahead: Vector) -> Vector:
+        """Vector from the start of a ray to its end, 1/256 px."""
+        length = self._length
+        return ahead if length is None else (over_one(ahead[0] * length), over_one(ahead[1] * length))
 
     def _weight(self, step: tuple[int, int], entry: int) -> int:
         scale = Lines(np.zeros((1, 2), np.int64), np.array([step]), self._ray.radius_256).scale
@@ -211,41 +221,69 @@ class ReadyRay(Ready[RayHits]):
 
 
 @lru_cache(NUMBERS_KEPT)
-def _offsets(spread: Spread[Any], seed: int, number: int) -> list[Vector]:
-    """Offsets of the pellets of a shot number, 1/256 px."""
-    pellets_xy = pellets_of(spread, np.array([seed], np.uint64), np.array([number]), ZEROS[:1])[0]
+def _offsets(spread: Spread[Any], seed: int, number: int, round_: int) -> list[Vector]:
+    """Offsets of the pellets of a round of a shot number, 1/256 px."""
+    pellets_xy = pellets_of(spread, np.array([seed], np.uint64), np.array([number]), np.array([round_]))[0]
     return [(SUB * x, SUB * y) for x, y in pellets_xy.tolist()]
 
 
-class ReadySpread(ReadyRay):
-    """Prepared spread of a few rays that end at their first hit; see `ReadyRay` for what is left to `fire`."""
+def _turned(vector: Vector, direction: Vector) -> Vector:
+    """`grid.fixed_point.turned` of one vector, in Python integers."""
+    (x, y), (c, s) = vector, direction
+    return over_one(x * c - y * s), over_one(x * s + y * c)
 
-    def __init__(self, scene: Scene, weapon: Weapon, kept: Filter, ray: RayWeapon, spread: Spread[Any]) -> None:
-        super().__init__(scene, weapon, kept, ray)
-        self.rays, self._spread = spread.count, spread
 
-    def _with(self, kept: Filter) -> ReadySpread:
-        return ReadySpread(self.scene, self.weapon, kept, self._ray, self._spread)
+class ReadyRays(ReadyRay):
+    """Prepared burst, spread or sweep of a few rays that end at their first hit; see `ReadyRay`."""
 
-    def _answered(self, hits: OneShotOfRays, start: Vector, step: Vector) -> bool:
-        """Add the rows of a shot to its answer, those of the nearest hit first; False if it is left to `fire`."""
-        follow, ends, met = self._follows or self._chosen(), [], []
+    def __init__(self, scene: Scene, weapon: Weapon, kept: Filter, parts: RayParts) -> None:
+        super().__init__(scene, weapon, kept, parts[2])
+        self._parts, self.rays = parts, rays_in(parts)
+        burst, several, _ = parts
+        self._turns = [unit_of(burst.recoil_deg * k) for k in range(burst.count)] if burst else [STRAIGHT]
+        self._shift: list[int] = snap(burst.recoil_xy).tolist() if burst else [0, 0]
+        self._fan: list[Vector] = list(map(tuple, several.directions.tolist())) if isinstance(several, Sweep) else []
+
+    def _with(self, kept: Filter) -> ReadyRays:
+        return ReadyRays(self.scene, self.weapon, kept, self._parts)
+
+    def _answered(self, hits: OneShotOfRays, start: Vector, ahead: Vector) -> bool:
+        """Add the rows of a shot to its answer, round by round; False if it is left to `fire`."""
+        follow, hits.rays = self._follows or self._chosen(), self.rays
         number: Any = hits._arguments[2] or 0
-        for dx, dy in _offsets(self._spread, self._filter.seed, number):
-            end = step[0] + dx, step[1] + dy
-            followed = follow(*start, *end)
-            if followed is None or self._must_walk(*followed):
-                return False
-            if followed[1]:
-                ends.append(end)
-                met += followed[1]
-        hits.rays = self.rays
-        if met:
-            self._add_rows(hits, start, np.array(ends), met)
+        for round_, turn in enumerate(self._turns):
+            begin, ends, met = (start[0] + round_ * self._shift[0], start[1] + round_ * self._shift[1]), [], []
+            for end in self._ends(_turned(ahead, turn) if round_ else ahead, number, round_):
+                followed = follow(*begin, *end)
+                if followed is None or self._must_walk(*followed):
+                    return False
+                if followed[1]:
+                    ends.append(end)
+                    met += followed[1]
+            if len(met) == 1:
+                self._add_of_one(hits, round_, begin, ends[0], met)
+            elif met:
+                self._add_rows(hits, round_, begin, np.array(ends), met)
         return True
 
-    def _add_rows(self, hits: OneShotOfRays, start: Vector, steps: Ints, met: list[list[int]]) -> None:
-        """Add rows of what rays (k,) along steps (k, 2) hit first; `met` is that of `Followed`."""
+    def _ends(self, ahead: Vector, number: int, round_: int) -> list[Vector]:
+        """Vectors from the start of a round's rays to their ends, 1/256 px."""
+        several = self._parts[1]
+        if isinstance(several, Sweep):
+            return [self._scaled(_turned(ahead, turn)) for turn in self._fan]
+        x, y = self._scaled(ahead)
+        if several is None:
+            return [(x, y)]
+        return [(x + dx, y + dy) for dx, dy in _offsets(several, self._filter.seed, number, round_)]
+
+    def _add_rows(self, hits: OneShotOfRays, round_: int, start: Vector, steps: Ints, met: list[list[int]]) -> None:
+        """Add rows of what the rays (k,) of a round hit first, the nearest hit first.
+
+        Parameters
+        ----------
+        start, steps : of the rays, (2,) and (k, 2)
+        met : what they hit, as in `Followed`
+        """
         lines = Lines(np.zeros_like(steps), steps, self._ray.radius_256)
         entry = np.array([time for *_, time in met])
         weights = weights_at(entry, lines.scale, self._fades).tolist()
@@ -259,4 +297,4 @@ class ReadySpread(ReadyRay):
         for rank, ((x, y), pixels, pellets, weight) in rows.items():
             column, line = x - ((start[0] + HALF) >> 8), y - ((start[1] + HALF) >> 8)
             of_pixels = pellets, len(pixels), weight, pellets, (x, y), column * column + line * line
-            hits.append(new(HitRow, (0, 0, self._ids[rank], *of_pixels)))
+            hits.append(new(HitRow, (0, round_, self._ids[rank], *of_pixels)))

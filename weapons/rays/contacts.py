@@ -30,7 +30,7 @@ from hitplanes.planes.grid.spans import Box, Columns, begins, clipped, merged_ru
 from hitplanes.planes.scene.items import Items, Stack
 
 from ..fire.plan import Plan
-from ..kinds.areas import Rounds, Spread
+from ..kinds.areas import RayParts, Spread
 from ..kinds.placements import ZEROS, Shots, pellets_of, recoiled
 from ..kinds.rays import Projectile, RayWeapon, Sweep, is_moving
 
@@ -59,16 +59,7 @@ class Rays(Columns):
         return int(self.round.max(initial=0)) + 1
 
 
-Parts = tuple[Rounds[Any] | None, Spread[Any] | Sweep | None, RayWeapon]
-
-
-def rays_each(parts: Parts) -> int:
-    """Number of rays of a shot."""
-    burst, several, _ = parts
-    return (burst.count if burst else 1) * (several.count if several else 1)
-
-
-def rays_of(parts: Parts, shots: Shots) -> Rays:
+def rays_of(parts: RayParts, shots: Shots) -> Rays:
     """Make the ray of every pellet of every round of every shot; `parts` are the weapon's."""
     burst, several, _ = parts
     rounds, pellets = burst.count if burst else 1, several.count if several else 1
@@ -85,7 +76,7 @@ def rays_of(parts: Parts, shots: Shots) -> Rays:
     return Rays(start, step, origin_xy, shot, round_, pellet)
 
 
-def _steps(parts: Parts, shots: Shots, shot: Ints, round_: Ints) -> Ints:
+def _steps(parts: RayParts, shots: Shots, shot: Ints, round_: Ints) -> Ints:
     """Vectors from the start of each ray to its end; `shot` and `round_` are those of each round of all shots."""
     burst, several, ray = parts
     length = ray.length_256

@@ -25,10 +25,11 @@ from ..fire.hits import Rows
 from ..fire.plan import Plan, leave_out_absent, leave_out_imagery, read_stack
 from ..fire.prefilter import Candidates, may_refuse, view_of
 from ..fire.strategy import AUTO, RAY_WAYS, RayChoice, are_faster_alone, chosen_candidates, chosen_ray_way
+from ..kinds.areas import RayParts, rays_in
 from ..kinds.placements import Shots
 from ..kinds.rays import RayWeapon, ends_at_first, is_thin_first
 from ..kinds.weapon import Weapon
-from .contacts import Parts, Rays, Reason, Terminations, Touches, rays_each, rays_of
+from .contacts import Rays, Reason, Terminations, Touches, rays_of
 from .first_hit import FirstHits, ends_by_march
 from .ray_hits import Later, Passes, RayHits, Stops, Summed, Walk, rows_of_passes, walked_of
 from .ray_walk import Range, expected_cells, has_whole_walk, trace
@@ -63,11 +64,11 @@ class Made(NamedTuple):
 
 
 def fired_rays(
-    scene: Scene, weapon: Weapon, parts: Parts, shots: Shots, how: tuple[str, str, str], plan: Plan
+    scene: Scene, weapon: Weapon, parts: RayParts, shots: Shots, how: tuple[str, str, str], plan: Plan
 ) -> RayHits:
     """Decide what shots of a ray weapon hit; `how` is (prefilter, broadphase, strategy) of `fire`."""
     ray = parts[2]
-    each = rays_each(parts)
+    each = rays_in(parts)
     through, chosen, choose = _planned(scene, ray, view_of(False, shots), each * len(shots), how, plan)
     step = max(1, RAYS_AT_ONCE // each)
     rows: list[Rows] = []
@@ -141,7 +142,7 @@ def end_times(scene: Scene, ray: RayWeapon, view: View | None, count: int) -> Ca
     return ended
 
 
-def items_hit(scene: Scene, parts: Parts, shots: Shots) -> tuple[Ints, Ints]:
+def items_hit(scene: Scene, parts: RayParts, shots: Shots) -> tuple[Ints, Ints]:
     """Items that shots hit, as (shot, rank), some several times. Rows, passes and stops are not made."""
     ray, rays = parts[2], rays_of(parts, shots)
     through, chosen, choose = _planned(scene, ray, view_of(False, shots), len(rays), AUTO, Plan())

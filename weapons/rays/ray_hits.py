@@ -21,21 +21,10 @@ from hitplanes.planes.scene.scene import Scene
 from .. import late
 from ..fire.hits import HitRow, Hits, Rows
 from ..fire.plan import Plan
-from ..kinds.areas import ray_parts_of
+from ..kinds.areas import RayParts, ray_parts_of
 from ..kinds.placements import ShotColumns, Shots
 from ..kinds.weapon import Weapon, smoothed
-from .contacts import (
-    Contacts,
-    Parts,
-    Rays,
-    Reason,
-    Terminations,
-    Touches,
-    cells_hit,
-    find_contacts,
-    last_of_each,
-    stretches,
-)
+from .contacts import Contacts, Rays, Reason, Terminations, Touches, cells_hit, find_contacts, last_of_each, stretches
 
 if TYPE_CHECKING:
     from ..explain.margins import Margin
@@ -449,7 +438,7 @@ class RayHits(Hits):
         return found
 
     @property
-    def _parts(self) -> Parts:
+    def _parts(self) -> RayParts:
         parts = ray_parts_of(self.weapon)
         assert parts is not None  # it was fired as one
         return parts
