@@ -24,6 +24,7 @@ from hitplanes import (
     ALL,
     Beam,
     Box,
+    Cone,
     Disc,
     Hits,
     InputError,
@@ -169,12 +170,15 @@ WEAPONS: dict[str, tuple[Weapon, dict[str, Any]]] = {
     "beam": (Beam(200, 9), {}),
     "box": (Box(31, 8), {"exclude": 2}),
     "shotgun": (Spread(Disc(2), 6, 21.3), {"seed": 5}),
+    "fading shotgun": (Spread(Disc(9, falloff="linear"), 6, 40), {"seed": 5}),
+    "fading cones": (Spread(Cone(70, 50, falloff="smooth", pierce=True), 3, 9), {}),
     "a single pellet": (Spread(Disc(2), 1, 21.3), {"seed": 3}),
     "burst of single pellets": (Rounds(Spread(Disc(1), 1, 15), 2), {}),
     "wide spread": (Spread(Box(9, 2), 6, 80), {"seed": 2**64 - 1}),
     "burst": (Rounds(Beam(60, 3), 3, (5, -70), 11), {}),
     "sub-pixel recoil": (Rounds(Disc(5), 3, (0.3, 7)), {}),
     "burst of spreads": (Rounds(Spread(Disc(3, pierce=True), 3, 8), 2, (0, 4)), {"accept": ["default"]}),
+    "burst of fading spreads": (Rounds(Spread(Cone(40, 60, falloff="linear"), 4, 20), 3, (-4, 9), 30), {"seed": 9}),
     "giant": (Disc(600), {}),
     "pistol": (Pistol(100), {"exclude": 3}),
     "line of sight": (Laser(None), {}),
@@ -415,6 +419,13 @@ def test_bad_preparations_are_refused_in_the_same_words(name: str, bad: Any) -> 
 def test_only_a_scene_is_prepared_for() -> None:
     with pytest.raises(InputError, match="scene: expected a Scene, got str"):
         prepare("scene", Disc(3))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", ["fading shotgun", "burst", "burst of spreads", "burst of fading spreads"])
+def test_what_is_looked_up_is_not_left_to_fire(name: str, jit: bool) -> None:
+    weapon, options = WEAPONS[name]
+    hits = prepare(crowd(8), weapon, **options).fire((40.0, 60.0), 30.0)
+    assert type(hits) is OneShot and len(hits) > 0
 
 
 def test_a_batch_goes_the_way_of_fire() -> None:

@@ -159,15 +159,15 @@ class Weights:
     """
 
     def __init__(self, each: Ints, stride: int) -> None:
-        self._each, self._stride = each, stride
+        self.each, self._stride = each, stride
         self._planes: list[int] | None = None
         self._calls = 0
 
     @property
     def nbytes(self) -> int:
         """Bytes of the weights and of the planes."""
-        planes = WEIGHT_FULL.bit_length() * len(self._each) * self._stride // 7
-        return planes + int(self._each.nbytes)
+        planes = WEIGHT_FULL.bit_length() * len(self.each) * self._stride // 7
+        return planes + int(self.each.nbytes)
 
     def of(self, bits: int) -> int:
         """Sum of the weights of a subset."""
@@ -175,8 +175,8 @@ class Weights:
             self._calls += 1
             if self._calls <= OFTEN:
                 x, y = pixels_of(bits, self._stride).T
-                return int(self._each[y, x].sum())
-            digits = [self._each >> digit & 1 == 1 for digit in range(WEIGHT_FULL.bit_length())]
+                return int(self.each[y, x].sum())
+            digits = [self.each >> digit & 1 == 1 for digit in range(WEIGHT_FULL.bit_length())]
             self._planes = [packed_integer(plane, self._stride) for plane in digits]
         return sum((bits & plane).bit_count() << digit for digit, plane in enumerate(self._planes))
 

@@ -34,6 +34,7 @@ from ..kinds.placements import (
     distinct_patterns,
     pellets_of,
     placements_for,
+    placements_of,
 )
 from ..kinds.weapon import Pattern, PatternTable, Weapon
 
@@ -44,7 +45,7 @@ REACH_MOST = 500
 """Largest distance of a pixel from that of its round, px; larger patterns are left to `fire`."""
 
 PELLETS_PX = 2**19
-"""Most pellets of a spread, times the pixels of its box; of others `fire` takes less time, and less is kept."""
+"""Most pellets of a shot, times the pixels of a spread's box; of others `fire` takes less time, and less is kept."""
 
 TURNED_PX = 2
 """Margin for the pixels of a pattern that turns, beyond its reach: pixels that its axis meets, and rounding."""
@@ -71,15 +72,15 @@ def reach_of(weapon: Weapon) -> int | None:
     """Greatest distance of a pixel of an area weapon from that of its round, px.
 
     None if `fire` answers: if it is too large, if the pixels depend on the fraction of the position, if a line of sight
-    is needed, if pellets have weights or are many, and of bursts of spreads.
+    is needed, or if pellets are many.
     """
     burst, spread, plain = parts_of(weapon)
-    if plain.line_of_sight or (burst and (spread or (snap(burst.recoil_xy) % SUB).any())):
+    if plain.line_of_sight or (burst and (snap(burst.recoil_xy) % SUB).any()):
         return None
     reach = plain.reach_256 // SUB + (TURNED_PX if plain.directed else 0)
     if spread:
         reach += int(snap(spread.radius)) // SUB
-        if plain.falloff or spread.count * (2 * reach + 1) ** 2 > PELLETS_PX:
+        if placements_of(weapon) * (2 * reach + 1) ** 2 > PELLETS_PX:
             return None
     return reach if reach <= REACH_MOST else None
 
@@ -95,9 +96,11 @@ def rounds_of(weapon: Weapon, shot: Shots, offset_256: tuple[int, int] | None) -
             drawn = pellets_of(spread, shot.seed, shot.number, ORIGIN[:, 0])[0]
         return [Round(0, 0, 0, pattern, drawn)]
     placements = placements_for(weapon, shot)
-    patterns: list[Pattern] = [placements.table.patterns[kind] for kind in placements.pattern.tolist()]
-    places = enumerate(placements.turn_xy.tolist())
-    return [Round(x, y, number, patterns[number].table) for number, (x, y) in places]
+    turn_xy, pellets = placements.turn_xy, placements.pellets
+    patterns: list[Pattern] = [placements.table.patterns[kind] for kind in placements.pattern[::pellets].tolist()]
+    drawn = placements.xy.reshape(-1, pellets, 2) - turn_xy[:, None] if spread else [None] * len(turn_xy)
+    places = zip(turn_xy.tolist(), range(len(turn_xy)), patterns, drawn, strict=True)
+    return [Round(x, y, number, pattern.table, own) for (x, y), number, pattern, own in places]
 
 
 ORIGIN: Ints = np.zeros((1, 2), np.int64)

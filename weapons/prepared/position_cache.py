@@ -23,6 +23,7 @@ from hitplanes.planes.bits.tiles import (
     Depths,
     Ground,
     Hit,
+    Weights,
     hit_by_one,
     in_order,
     integers_ns,
@@ -89,14 +90,14 @@ ZERO = np.zeros(1, np.int64)
 
 @dataclass(frozen=True, eq=False)
 class Scattered(BigPattern):
-    """Pellets of one pattern as one integer, of the pixels of all, and an integer of each."""
+    """Pellets of one pattern as one integer, of the pixels of all, and the shift and the integer of each."""
 
-    pellets: tuple[int, ...] = ()
+    pellets: tuple[tuple[int, int], ...] = ()
 
     @property
     def nbytes(self) -> int:
         """Bytes of the pixels, of all pellets and of each."""
-        return super().nbytes + sum(pellet.bit_length() for pellet in self.pellets) // 7
+        return super().nbytes + sum(pellet.bit_length() for _, pellet in self.pellets) // 7
 
     def share(self, bits: int, count: int) -> int:
         """The pixels themselves: tiles of an item share none, so that their sum has all."""
@@ -104,20 +105,25 @@ class Scattered(BigPattern):
 
     def counted(self, share: int, pixels: int) -> tuple[int, int, int]:
         """Samples, weight and pellets of a hit on an item."""
-        each = [samples for pellet in self.pellets if (samples := (share & pellet).bit_count())]
-        return sum(each), sum(each) * WEIGHT_FULL, len(each)
+        hit = [(shift, bits) for shift, pellet in self.pellets if (bits := share & pellet)]
+        samples = sum(bits.bit_count() for _, bits in hit)
+        weights = self.weights
+        weight = sum(weights.of(bits >> shift) for shift, bits in hit) if weights else samples * WEIGHT_FULL
+        return samples, weight, len(hit)
 
 
 def scattered(pattern: BigPattern, offsets_xy: Ints) -> Scattered:
-    """Pellets of a pattern at offsets (K, 2) from the pixel that all are placed on; they have no weights."""
+    """Pellets of a pattern at offsets (K, 2) from the pixel that all are placed on."""
     (left, top), (right, bottom) = offsets_xy.min(axis=0).tolist(), offsets_xy.max(axis=0).tolist()
     wide, high = pattern.wide + right - left, pattern.high + bottom - top
     stride = stride_of(wide)
     rows = restrided(pattern.rows, pattern.high, pattern.stride, stride)
-    pellets = tuple(rows << (y - top) * stride + x - left for x, y in offsets_xy.tolist())
-    every = reduce(or_, pellets)
+    shifts = [(y - top) * stride + x - left for x, y in offsets_xy.tolist()]
+    pellets = tuple((shift, rows << shift) for shift in shifts)
+    every = reduce(or_, (pellet for _, pellet in pellets))
     x, y = pattern.x + left, pattern.y + top
-    return Scattered(x, y, wide, high, stride, every, Depths(every, stride, x, y), pellets=pellets)
+    weights = Weights(pattern.weights.each, stride) if pattern.weights else None
+    return Scattered(x, y, wide, high, stride, every, Depths(every, stride, x, y), weights, pellets)
 
 
 def restrided(rows: int, high: int, stride: int, wider: int) -> int:

@@ -71,7 +71,7 @@ class Ready(Generic[AnyHits]):
     that end at their first hit (see `prepared_ray`). These are left to `fire`:
 
     - other weapons of several rays, and rays that must walk (see `prepared_ray`)
-    - weapons with a line of sight; spreads with a falloff, of many or far pellets, and bursts of spreads
+    - weapons with a line of sight, and spreads of many or far pellets
     - larger patterns, and in numpy large patterns near which there are many items
     - bursts whose recoil is not a whole number of pixels
     - batches and bad input
