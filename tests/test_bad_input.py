@@ -80,6 +80,12 @@ def world() -> Scene:
     return scene
 
 
+def of_two_frames() -> Scene:
+    scene = Scene()
+    scene.add(Sprite.from_images([np.full((4, 4, 4), 255, np.uint8)] * 2), frame=1)
+    return scene
+
+
 def crowd() -> Scene:
     scene = Scene()
     for number in range(30):
@@ -264,6 +270,11 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
     "mask of what was removed": (lambda: world().mask(2), "expected an object in the scene, got 2, which was removed"),
     "mask of true": (lambda: world().mask(True), "^item: expected a whole number from 0 to 2, got True"),
     "name of nothing": (lambda: world().name_of(3), "^item: expected a whole number from 0 to 2, got 3"),
+    "a row of categories": (
+        lambda: world().add(Sprite.circle(1), categories=np.array([[1, 2]])), "categories: expected one of"),
+    "a sprite without the frame": (
+        lambda: of_two_frames().set(0, sprite=Sprite.circle(4)),
+        "row 0: frame: expected one of the new sprite, as the object shows frame 1, and its new sprite has 1"),
     "bits of a category": (lambda: world().category_bits("freind"), "category: .*did you mean 'friend'"),
     "bits of a number": (
         lambda: world().category_bits(1), "category: expected one of .*got 1"),  # type: ignore[arg-type]

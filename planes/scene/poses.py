@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple, TypeGuard
 
 import numpy as np
@@ -94,8 +94,10 @@ class Looks(NamedTuple):
             turns = all_quarter_turns([sprite.stepped(angle) for sprite, angle in zip(sprites, angles, strict=True)])
         if scale is not None:
             x, y = _scale_rows(scale, n)
-        if frame is not None or sprite is not None:
-            frames = _frame_rows(list(frames) if frame is None else frame, sprites)
+        if frame is not None:
+            frames = _frame_rows(frame, sprites)
+        elif sprite is not None:
+            _check_frames(frames, sprites)
         if flip is not None:
             flips = _flip_rows(flip, n)
         return Looks(sprites, angles, list(map(Transform, frames, flips, x, y, *turns)))
@@ -127,6 +129,14 @@ def _frame_rows(frame: object, sprites: list[Sprite]) -> list[int]:
             with within(f"row {row}"):
                 numbers[row] = frame_number(sprite, numbers[row])
     return numbers
+
+
+def _check_frames(frames: Sequence[int], sprites: list[Sprite]) -> None:
+    """Check that the new sprites of objects have the frames that these show."""
+    for row, (number, sprite) in enumerate(zip(frames, sprites, strict=True)):
+        if number >= sprite.frame_count:
+            found = f"the object shows frame {number}, and its new sprite has {sprite.frame_count}"
+            raise InputError(f"row {row}: frame: expected one of the new sprite, as {found}")
 
 
 def _flip_rows(flip: object, n: int) -> list[str]:

@@ -391,10 +391,10 @@ class Scene:
     def category_bits(self, *names: str, field: str = "category") -> int:
         """Bits of categories by the names that `category_names` tells; an error says `field`."""
         known, bits = self.categories, 0
-        if not all(name in known for name in names):
+        if not all(isinstance(name, str) and name in known for name in names):
             known = tuple(self._bit_names())
         for name in names:
-            if name not in known:
+            if not isinstance(name, str) or name not in known:
                 choice(field, name, self.categories)
             bits |= 1 << known.index(name)
         return bits
