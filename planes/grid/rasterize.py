@@ -90,8 +90,9 @@ def polygons(points: Ints, starts: Ints) -> RowRuns:
 def _even_odd(points: Ints, starts: Ints) -> tuple[Ints, Ints, Ints, Ints]:
     """Shape, row, and first and last pixel of runs inside polygons and on their edges, in no order.
 
-    A centre is inside if an odd number of crossings lies at or left of it. Crossings are rounded up to centres before
-    they are sorted, which changes no count and avoids comparing rationals.
+    A row is filled from each of its crossings at an odd place to the next one, both included. To sort them needs no
+    rational: twice the centre at or left of a crossing, plus 1 if it lies beyond. Edges are half-open in y, so that a
+    vertex between two of them counts once; what lies on a lower end, or on a flat edge, is added.
     """
     corners = points.shape[1]
     following = np.arange(1, corners + 1)
@@ -99,19 +100,25 @@ def _even_odd(points: Ints, starts: Ints) -> tuple[Ints, Ints, Ints, Ints]:
     start, end = (ends.reshape(-1, 2) for ends in (points, points[:, following]))
     down = (start[:, 1] > end[:, 1])[:, None]
     (x0, y0), (x1, y1) = np.where(down, end, start).T, np.where(down, start, end).T
-    edge, y = _ragged_rows(-(-y0 // SUB), y1 // SUB)
-    shape = edge // corners
-    x0, y0, x1, y1 = x0[edge], y0[edge], x1[edge], y1[edge]
-    flat, per = y0 == y1, np.maximum(y1 - y0, 1)
-    at = x0 * per + (SUB * y - y0) * (x1 - x0)  # where edges and rows cross; a flat edge extends from end to end
-    left, right = np.where(flat, np.minimum(x0, x1), at), np.where(flat, np.maximum(x0, x1), at)
-    left, right = -(-left // (SUB * per)), right // (SUB * per)
-    crossing = ~flat & (SUB * y < y1)  # half-open in y: a vertex between two edges counts once
-    of, row, x = shape[crossing], y[crossing], left[crossing]
-    order = np.lexsort((x, row, of))
-    inside = of[order][::2], row[order][::2], x[order][::2], x[order][1::2] - 1
-    first, second, third, fourth = (np.concatenate(pair) for pair in zip((shape, y, left, right), inside, strict=True))
+    at, flat = np.flatnonzero(y1 % SUB == 0), y0 == y1
+    left, right = (np.where(flat, side(x0, x1), x1)[at] for side in (np.minimum, np.maximum))
+    edge, row = _ragged_rows(-(-y0 // SUB), -(-y1 // SUB) - 1)
+    dx, dy = (x1 - x0)[edge], (y1 - y0)[edge]
+    whole, rest = np.divmod(x0[edge] * dy + (SUB * row - y0[edge]) * dx, SUB * dy)
+    inside = _between_every_two(edge // corners, row, 2 * whole + (rest > 0))
+    touched = at // corners, y1[at] // SUB, -(-left // SUB), right // SUB
+    first, second, third, fourth = (np.concatenate(pair) for pair in zip(inside, touched, strict=True))
     return first, second, third, fourth
+
+
+def _between_every_two(shape: Ints, y: Ints, x: Ints) -> tuple[Ints, Ints, Ints, Ints]:
+    """Runs between every two crossings (n,) of a row; they are sorted as one number each."""
+    (top, low), (left, right) = ((int(key.min(initial=0)), int(key.max(initial=0)) + 1) for key in (y, x))
+    number = np.sort((shape * (low - top) + y - top) * (right - left) + x - left)
+    row = number[::2] // (right - left)
+    first, last = (end - row * (right - left) + left for end in (number[::2], number[1::2]))
+    shape = row // (low - top)
+    return shape, row - shape * (low - top) + top, first + 1 >> 1, last >> 1
 
 
 def convex_polygons(points: Ints) -> RowRuns | None:

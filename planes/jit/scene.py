@@ -252,44 +252,52 @@ def convex_polygons(points: Ints) -> RowRuns | None:
     return RowRuns(shape, y, parts) if convex else None
 
 
-@helper(allocates=True)
-def _even_odd_row(corner, following, row, parts, used, at):
-    """Add to a row of a polygon what its edges touch, and what lies between every two of its crossings."""
-    level, count, crossing = SUB * row, 0, np.empty(len(corner), np.int64)
-    for i in range(len(corner)):
-        (x0, y0), (x1, y1) = corner[i], corner[following[i]]
-        if y1 < y0:
-            x0, y0, x1, y1 = x1, y1, x0, y0
-        if not y0 <= level <= y1:
-            continue
-        if y0 == y1:
-            first, last = _ceil(min(x0, x1), SUB), max(x0, x1) // SUB
-        else:
-            across, per = x0 * (y1 - y0) + (level - y0) * (x1 - x0), SUB * (y1 - y0)
-            first, last = _ceil(across, per), across // per
-            if level < y1:
-                j, count = count, count + 1
-                while j and crossing[j - 1] > first:
-                    crossing[j], j = crossing[j - 1], j - 1
-                crossing[j] = first
-        parts = add_run(parts, used, at, first, last)
-    for i in range(0, count, 2):
-        parts = add_run(parts, used, at, crossing[i], crossing[i + 1] - 1)
-    return parts
+@helper()
+def _cross(x0, y0, x1, y1, top, crossing, count):
+    """Add where an edge that goes down crosses rows to their sorted crossings, see `rasterize._even_odd`."""
+    upper, per, step = _ceil(y0, SUB), SUB * (y1 - y0), SUB * (x1 - x0)
+    across, more, over = x0 * (y1 - y0) + (SUB * upper - y0) * (x1 - x0), step // per, step % per
+    quotient, rest = across // per, across % per
+    for row in range(upper - top, _ceil(y1, SUB) - top):
+        x, j = 2 * quotient + (rest > 0), count[row]
+        count[row] += 1
+        while j > 0 and crossing[row, j - 1] > x:
+            crossing[row, j], j = crossing[row, j - 1], j - 1
+        crossing[row, j] = x
+        rest += over
+        carried = rest >= per
+        quotient += more + carried
+        rest -= per if carried else 0
 
 
 @compiled(types.Tuple((OUT, OUT, PARTS))(STEPS, INTS))
 def _even_odd(points, starts):
-    count, corners = points.shape[:2]
-    following, top, low = np.arange(1, corners + 1), np.empty(count, np.int64), np.empty(count, np.int64)
+    number, corners = points.shape[:2]
+    following, top, low = np.arange(1, corners + 1), np.empty(number, np.int64), np.empty(number, np.int64)
     for i in range(len(starts)):
         following[(starts[i + 1] if i + 1 < len(starts) else corners) - 1] = starts[i]
-    for k in range(count):
+    high = 0
+    for k in range(number):
         top[k], low[k] = _ceil(points[k, :, 1].min(), SUB), points[k, :, 1].max() // SUB
-    shape, y, _ = layout(top, low)
+        high = max(high, low[k] - top[k] + 1)
+    shape, y, begin = layout(top, low)
     parts, used = empty_parts(2, len(y)), np.zeros(len(y), np.int64)
-    for i in range(len(y)):
-        parts = _even_odd_row(points[shape[i]], following, y[i], parts, used, i)
+    crossing, count = np.empty((high, corners), np.int64), np.empty(high, np.int64)
+    for k in range(number):
+        count[:] = 0
+        for i in range(corners):
+            (x0, y0), (x1, y1) = points[k, i], points[k, following[i]]
+            if y1 < y0:
+                x0, y0, x1, y1 = x1, y1, x0, y0
+            if y0 < y1:
+                _cross(x0, y0, x1, y1, top[k], crossing, count)
+            if y1 % SUB == 0:  # its lower end, which counts as no crossing, or a flat edge
+                left, right = (min(x0, x1), max(x0, x1)) if y0 == y1 else (x1, x1)
+                parts = add_run(parts, used, begin[k] + y1 // SUB - top[k], _ceil(left, SUB), right // SUB)
+        for row in range(begin[k + 1] - begin[k]):
+            for i in range(0, count[row], 2):
+                first, last = (crossing[row, i] + 1) >> 1, crossing[row, i + 1] >> 1
+                parts = add_run(parts, used, begin[k] + row, first, last)
     return shape, y, parts
 
 
