@@ -35,6 +35,7 @@ from hitplanes.planes.bits import bit_rows, cells, front_to_back, tiles, visible
 from hitplanes.planes.bits.bit_rows import WORD
 from hitplanes.planes.common.checks import Bools
 from hitplanes.planes.common.limits import ALL
+from hitplanes.planes.grid import spans as grid_spans
 from hitplanes.planes.scene import variants as variants_module
 from hitplanes.weapons.fire import areas
 from hitplanes.weapons.fire import spans as spans_module
@@ -67,7 +68,7 @@ PARTS: dict[str, dict[str, int]] = {
 }  # fmt: skip
 """Limits that cut a batch, and choose between two ways to do the same."""
 
-OWNERS = areas, spans_module, strategy_module, weapon_module, tiles, bit_rows, front_to_back, cells, visible
+OWNERS = areas, spans_module, strategy_module, weapon_module, tiles, bit_rows, front_to_back, cells, visible, grid_spans
 
 
 @pytest.fixture

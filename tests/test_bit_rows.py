@@ -20,6 +20,7 @@ from hitplanes.planes.bits.front_to_back import OrderedTiles, Rule
 from hitplanes.planes.bits.tiles import STRIDE, TileAtlas, Tiles
 from hitplanes.planes.common.backend import kernels_of
 from hitplanes.planes.common.checks import InputError
+from hitplanes.planes.grid import spans
 from hitplanes.planes.grid.fixed_point import ONE
 from hitplanes.planes.grid.spans import Spans
 from hitplanes.weapons.kinds import weapon
@@ -236,8 +237,8 @@ def test_the_order_of_rows(seed: int, far: int, few: int) -> None:
     keys = [sorted(rng.randint(0, 3) for _ in range(count))]
     keys += [[rng.randint(-min(far, 9), far) for _ in range(count)] for _ in range(3)]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(bit_rows, "FEW_ROWS", few)
-        order = bit_rows.row_order(*(as_read(np.array(key, np.int64), rng) for key in keys))
+        patch.setattr(spans, "FEW_ROWS", few)
+        order = spans.row_order(*(as_read(np.array(key, np.int64), rng) for key in keys))
     assert order.tolist() == sorted(range(count), key=lambda i: [key[i] for key in keys])
 
 

@@ -7,7 +7,7 @@ need no test. All functions map arrays to arrays; `jit.bit_rows` has the compile
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -357,23 +357,3 @@ def weights_of(rows: Words, windows: PatternBits, pattern: Ints | int, left: Int
         rest = words.nonzero()[0]
         words, begin, pair = words[rest], begin[rest], pair[rest]
     return total
-
-
-# house: row order
-def row_order(*keys: npt.NDArray[Any]) -> Ints:
-    """Order of rows by keys (n,), the most important first, then by place: whole keys as one number, if that fits."""
-    if len(keys[0]) <= FEW_ROWS or any(key.dtype.kind == "f" for key in keys):
-        return np.lexsort(keys[::-1])
-    least = [int(np.minimum.reduce(key)) for key in keys]
-    bits = [(int(np.maximum.reduce(key)) - low).bit_length() for key, low in zip(keys, least, strict=True)]
-    if sum(bits) >= WORD:
-        return np.lexsort(keys[::-1])
-    number = keys[0] - least[0]
-    for key, low, size in zip(keys[1:], least[1:], bits[1:], strict=True):
-        number <<= size
-        number |= key - low
-    return np.asarray(number.argsort(kind="stable"))
-
-
-FEW_ROWS = 64
-"""So few rows are sorted by their keys, as they are: finding out how large those are takes longer."""

@@ -15,9 +15,9 @@ import numpy as np
 from .. import late
 from ..common.backend import kernels_of
 from ..common.checks import Bools, Ints
-from ..grid.spans import Box, begins, ragged, sorted_once
+from ..grid.spans import Box, begins, ragged, row_order, sorted_once
 from . import bit_rows
-from .bit_rows import PatternBits, Placed, Words, nearest, row_order, rows_of, weights_of
+from .bit_rows import PatternBits, Placed, Words, nearest, rows_of, weights_of
 from .cells import Cells, listed_at, met_boxes
 
 if TYPE_CHECKING:
@@ -320,7 +320,7 @@ def _counted(placed: Placed, each: int, windows: PatternBits, tiles: OrderedTile
 
 def _distinct(turn: Ints, near: Near, tiles: OrderedTiles, rows: Words, samples: Ints) -> Ints:
     """Pixels (n,) of pairs that no earlier pellet of the round hit on the tile: all with the first that hit it."""
-    order = np.lexsort((near.tile, turn))
+    order = row_order(turn, near.tile)
     new = begins(turn[order]) | begins(near.tile[order])
     first = new.nonzero()[0]
     pixels = np.zeros_like(samples)
@@ -356,7 +356,7 @@ def hits_of_rounds(found: TileHits, each: int) -> RoundHits:
     samples, distance2, x, y, weight, pixels = found[2:]
     pellets: Ints | None = None
     if each > 1 or np.logical_or.reduce((rank[1:] == rank[:-1]) & (turn[1:] == turn[:-1])):
-        order = np.lexsort((found.placement, rank, turn))
+        order = row_order(turn, rank, found.placement)
         new = begins(turn[order]) | begins(rank[order])
         first = new.nonzero()[0]
         samples = _added(samples[order], first)

@@ -106,13 +106,33 @@ def meets(a: npt.NDArray[Any], b: npt.NDArray[Any]) -> Bools:
     return np.asarray(good)
 
 
+FEW_ROWS, KEY_BITS = 64, 63
+"""So few rows are sorted by their keys, as they are: finding out how large those are takes longer. Bits of a key."""
+
+
+# house: row order
+def row_order(*keys: npt.NDArray[Any]) -> Ints:
+    """Order of rows by keys (n,), the most important first, then by place: whole keys as one number, if that fits."""
+    if len(keys[0]) <= FEW_ROWS or any(key.dtype.kind == "f" for key in keys):
+        return np.lexsort(keys[::-1])
+    least = [int(np.minimum.reduce(key)) for key in keys]
+    bits = [(int(np.maximum.reduce(key)) - low).bit_length() for key, low in zip(keys, least, strict=True)]
+    if sum(bits) > KEY_BITS:
+        return np.lexsort(keys[::-1])
+    number = keys[0] - least[0]
+    for key, low, size in zip(keys[1:], least[1:], bits[1:], strict=True):
+        number <<= size
+        number |= key - low
+    return np.asarray(number.argsort(kind="stable"))
+
+
 def merged_runs(row: Ints, x_first: Ints, x_last: Ints) -> tuple[Ints, Ints, Ints]:
     """Union of runs on numbered rows, as maximal runs sorted by (row, x_first); empty runs are dropped.
 
     Returned are the number of the first run that went into each maximal run, x_first, and x_last.
     """
     filled = np.flatnonzero(x_first <= x_last)
-    order = filled[np.lexsort((x_first[filled], row[filled]))]
+    order = filled[row_order(row[filled], x_first[filled])]
     row, x_first, x_last = row[order], x_first[order], x_last[order]
     if not len(row):
         return order, x_first, x_last

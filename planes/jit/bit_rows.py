@@ -10,13 +10,13 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from ..bits import bit_rows, shadows
+from ..bits import shadows
 from ..bits.bit_rows import NO_STRIPS, NO_SUMS, WORD, PatternBits, Words
 from ..bits.blockers import Blockers
 from ..common.backend import in_parts
 from ..common.checks import Ints
 from ..common.limits import GOLDEN, SUB
-from ..grid.spans import WIDEST, RowRuns
+from ..grid.spans import WIDEST, RowRuns, row_order
 from .cache import compiled, helper
 
 INTS = types.Array(types.int64, 1, "A", readonly=True)
@@ -127,7 +127,7 @@ def _filled(kernel: Kernel, columns: int, first: int, last: int, given: tuple[An
             return None
         if first == last:
             rows = out[:, :count]
-            return rows if crowd <= FEW_ROWS else rows[:, bit_rows.row_order(rows[0], *rows[[-3, -1, -2, 1]])]
+            return rows if crowd <= FEW_ROWS else rows[:, row_order(rows[0], *rows[[-3, -1, -2, 1]])]
         more = np.empty((columns, 2 * out.shape[1]), np.int64)
         more[:, :count] = out[:, :count]
         out = more

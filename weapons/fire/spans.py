@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hitplanes.planes.bits.bit_rows import row_order
 from hitplanes.planes.bits.span_walk import (
     HIT,
     LIVE,
@@ -23,7 +22,7 @@ from hitplanes.planes.bits.span_walk import (
 )
 from hitplanes.planes.common.checks import Ints
 from hitplanes.planes.common.limits import CHUNK_PAIRS, CHUNK_SAMPLES
-from hitplanes.planes.grid.spans import area, begins, clipped, merged_runs, pieces, sorted_once
+from hitplanes.planes.grid.spans import area, begins, clipped, merged_runs, pieces, row_order, sorted_once
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 

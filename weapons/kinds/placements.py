@@ -12,13 +12,13 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from hitplanes.planes.bits.bit_rows import Words, row_order
+from hitplanes.planes.bits.bit_rows import Words
 from hitplanes.planes.common.backend import cached_attribute, kernels_of
 from hitplanes.planes.common.checks import Floats, InputError, Ints, array_of, each, ids_of, integer, integers, reals
 from hitplanes.planes.common.limits import ALL, CATEGORY_BITS, EVERYTHING, POSITION_MAX, SEED_MAX
 from hitplanes.planes.grid import fixed_point
 from hitplanes.planes.grid.fixed_point import ONE, Whole, pixel, snap, turned, unit, unit_of, unit_toward
-from hitplanes.planes.grid.spans import Columns
+from hitplanes.planes.grid.spans import Columns, row_order
 from hitplanes.planes.scene.poses import one_place, points
 
 from .. import late

@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from hitplanes.planes.bits.bit_rows import row_order
 from hitplanes.planes.common.backend import cached_attribute, kernels_of
 from hitplanes.planes.common.checks import Ints
 from hitplanes.planes.common.limits import HALF, POSITION_MAX, REACH_MAX, SUB, WEIGHT_FULL
 from hitplanes.planes.grid.fixed_point import over_one, pixel, snap, toward, unit_of
 from hitplanes.planes.grid.rasterize import Lines
+from hitplanes.planes.grid.spans import row_order
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 

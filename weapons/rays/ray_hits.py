@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from hitplanes.planes.bits.bit_rows import row_order
 from hitplanes.planes.common.checks import Bools, Floats, InputError, Ints
 from hitplanes.planes.common.limits import CHUNK_CELLS, HALF, IDS_MAX, SUB, WEIGHT_FULL
 from hitplanes.planes.grid.fixed_point import muldiv, pixel
 from hitplanes.planes.grid.rasterize import Lines
-from hitplanes.planes.grid.spans import Box, Spans, begins, pieces, sorted_once
+from hitplanes.planes.grid.spans import Box, Spans, begins, pieces, row_order, sorted_once
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
