@@ -177,25 +177,31 @@ def empty_parts(count, rows):
 
 
 @helper(allocates=True)
+def more_parts(parts):
+    """Twice as many parts, of which the first are the given ones."""
+    more = empty_parts(2 * len(parts), parts.shape[2])
+    for k in range(parts.size):
+        more.flat[k] = parts.flat[k]
+    return more
+
+
+@helper()
 def add_run(parts, used, row, first, last):
     """Add a run, if it is not empty, to a row: to the run that was added last, if it touches that one.
 
-    Parts are returned, of which there may be more; the first `used` (k,) of each row are not empty.
+    Returned is whether that was done, or there is no room; the first `used` (k,) parts of each row are not empty.
     """
     if first > last:
-        return parts
+        return True
     part = used[row] - 1
     if part >= 0 and first <= parts[part, 1, row] + 1 and last >= parts[part, 0, row] - 1:
         parts[part, 0, row], parts[part, 1, row] = min(parts[part, 0, row], first), max(parts[part, 1, row], last)
-        return parts
+        return True
     if part + 1 == len(parts):
-        more = empty_parts(2 * len(parts), parts.shape[2])
-        for k in range(parts.size):
-            more.flat[k] = parts.flat[k]
-        parts = more
+        return False
     parts[part + 1, 0, row], parts[part + 1, 1, row] = first, last
     used[row] += 1
-    return parts
+    return True
 
 
 @helper()
@@ -293,11 +299,13 @@ def _even_odd(points, starts):
                 _cross(x0, y0, x1, y1, top[k], crossing, count)
             if y1 % SUB == 0:  # its lower end, which counts as no crossing, or a flat edge
                 left, right = (min(x0, x1), max(x0, x1)) if y0 == y1 else (x1, x1)
-                parts = add_run(parts, used, begin[k] + y1 // SUB - top[k], _ceil(left, SUB), right // SUB)
+                while not add_run(parts, used, begin[k] + y1 // SUB - top[k], _ceil(left, SUB), right // SUB):
+                    parts = more_parts(parts)
         for row in range(begin[k + 1] - begin[k]):
             for i in range(0, count[row], 2):
                 first, last = (crossing[row, i] + 1) >> 1, crossing[row, i + 1] >> 1
-                parts = add_run(parts, used, begin[k] + row, first, last)
+                while not add_run(parts, used, begin[k] + row, first, last):
+                    parts = more_parts(parts)
     return shape, y, parts
 
 
@@ -524,7 +532,8 @@ def _turned_runs(begin, sides, pivots, quarter, c, s):
             high, at = lower - upper + 1, start[k] + upper - top[k]
             _turned_rows(sides[r], pivots[turns], c[k], s[k], upper, first[:high], last[:high])
             for i in range(high):
-                parts = add_run(parts, used, at + i, first[i], last[i])
+                while not add_run(parts, used, at + i, first[i], last[i]):
+                    parts = more_parts(parts)
     return shape, y, parts
 
 
