@@ -294,17 +294,22 @@ def pixels_within(placed: Placed, windows: PatternBits, count: Ints, bounds: Box
     if not len(at):
         return inside
     kind, left, top = placed.pattern[at], left[at] - (WORD - 1), top[at]
-    first = np.maximum(bounds[1] - top, 0)
-    rows = np.maximum(np.minimum(low[at], bounds[3]) - top - first + 1, 0)
+    high, first = low[at] - top + 1, np.maximum(bounds[1] - top, 0)
+    rows = np.maximum(np.minimum(high, bounds[3] - top + 1) - first, 0)
+    first = np.minimum(first, high)  # those beyond the bounds have no rows
     of, column = ragged((right[at] - left >> 6) + 1)
     left = left[of] + WORD * column
     begin, end = np.maximum(bounds[0] - left, 0), np.maximum(left + WORD - 1 - bounds[2], 0)
     begin, end = np.minimum(begin, WORD), np.minimum(end, WORD)
     kept = (_FULL << begin.view(np.uint64)) & (_FULL >> end.view(np.uint64))
-    place = (windows.first[kind] + first)[of] + column * windows.rows[kind][of]
-    word, row = ragged(rows[of])
-    pixels = np.bitwise_count(windows.words[place[word] + row] & kept[word])
-    inside[at] = np.bincount(of[word], pixels, len(at)).astype(np.int64)
+    place, rows = (windows.first[kind] + first)[of] + column * windows.rows[kind][of], rows[of]
+    total = np.concatenate([[0], np.cumsum(np.bitwise_count(windows.words), dtype=np.int64)])
+    pixels = (total[place + rows] - total[place]) * (kept != 0)
+    cut = (pixels > 0) & (kept != _FULL)
+    word, row = ragged(rows[cut])
+    left = np.bitwise_count(windows.words[place[cut][word] + row] & kept[cut][word])
+    pixels[cut] = np.bincount(word, left, np.count_nonzero(cut))
+    inside[at] = np.bincount(of, pixels, len(at)).astype(np.int64)
     return inside
 
 
