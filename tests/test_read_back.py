@@ -158,7 +158,7 @@ def test_a_sprite_in_steps_turns_the_pose_it_gets() -> None:
 @pytest.mark.parametrize(
     ("change", "told"),
     [
-        ({"sprite": FLAT}, r"row 0: frame: expected a whole number from 0 to 0, got 2"),
+        ({"sprite": FLAT}, "row 0: frame: expected one of the new sprite, as the object shows frame 2"),
         ({"sprite": [FLAT, TALL, FLAT], "frame": 0}, r"sprite: expected one for all or 2, got 3"),
         ({"sprite": [FLAT, 5], "frame": 0}, r"row 1: .*got"),
         ({"sprite": "tank.png"}, r"expected a Sprite"),
