@@ -58,8 +58,8 @@ def place_256(field: str, xy: object, limit: float) -> tuple[int, int]:
 
 
 def is_angle(value: object) -> TypeGuard[float]:
-    """Whether a value is a valid angle as it stands; others are checked as arrays, valid or not."""
-    return type(value) is float and math.isfinite(value)
+    """Whether a value is one valid angle as it stands; others are checked as arrays, valid or not."""
+    return math.isfinite(value) if type(value) is float else type(value) is int and abs(value) <= POSITION_MAX
 
 
 def scale_pair(scale: object) -> tuple[float, float]:
@@ -89,7 +89,7 @@ class Looks(NamedTuple):
         if sprite is not None:
             sprites = _sprite_rows(sprite, n)
         if angle is not None:
-            angles = [angle] * n if is_angle(angle) else reals("angle", each("angle", angle, n), (n,)).tolist()
+            angles = [float(angle)] * n if is_angle(angle) else reals("angle", each("angle", angle, n), (n,)).tolist()
         if angle is not None or sprite is not None:
             turns = all_quarter_turns([sprite.stepped(angle) for sprite, angle in zip(sprites, angles, strict=True)])
         if scale is not None:

@@ -23,7 +23,7 @@ from ..fire.call import fired
 from ..fire.plan import Plan
 from ..fire.spans import context_of, direct
 from ..fire.strategy import AUTO
-from ..kinds.areas import RayParts, parts_of, rays_in
+from ..kinds.areas import RayParts, parts_of, pellets_in
 from ..kinds.placements import Shots, placements_for
 from ..kinds.rays import Pistol
 from ..kinds.weapon import Weapon
@@ -108,7 +108,7 @@ def ray_margins(scene: Scene, parts: RayParts, shot: Shots, number: int) -> list
     An InputError says if there are too many rays.
     """
     burst, _, ray = parts
-    rays = rays_in(parts)
+    rays = pellets_in(parts)
     if rays > RAYS_MAX:
         raise InputError(f"shot: expected one of at most {RAYS_MAX} rays, got {rays}")
     stack, shifts = scene.items.stack(), RAY_SHIFTS if rays <= FINE_RAYS else PATTERN_SHIFTS.astype(np.float64)

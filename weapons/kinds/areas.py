@@ -17,7 +17,7 @@ from hitplanes.planes.common.limits import HALF, MASK_SIDE_MAX, PATTERN_CACHE_BY
 from hitplanes.planes.common.tables import Flag, Mask, Number, Numbers, Optional, Rows, Value, Whole, Word, typed
 from hitplanes.planes.grid import fixed_point, rasterize
 from hitplanes.planes.grid.fixed_point import ONE, all_quarters, pixel, quarters, snap, turned, unit_of
-from hitplanes.planes.grid.rasterize import Edges, disc, edges_of, polygon, ring
+from hitplanes.planes.grid.rasterize import ORIGIN, Edges, disc, edges_of, polygon, ring
 from hitplanes.planes.grid.spans import RowRuns, Spans
 from hitplanes.planes.scene.scene import Scene
 from hitplanes.planes.scene.sprite import Sprite, fits, frame_pivot, rows_of
@@ -42,7 +42,7 @@ SIGHTS = ("occluders", "all")
 FOLLOWED_MOST = 32
 """Most rays of a shot that a ready weapon follows one by one; more take less time together."""
 
-ORIGIN, ONE_RING = np.zeros(2, np.int64), np.zeros(1, np.int64)
+ONE_RING = np.zeros(1, np.int64)
 RING = Numbers((None, 2), REACH_MAX / 2, least=3)
 
 
@@ -396,11 +396,14 @@ class Rounds(Weapon, Generic[Repeated]):
 Rays = RayWeapon | Sweep | Spread[RayWeapon] | Rounds[RayWeapon | Sweep | Spread[RayWeapon]]
 """Weapons of rays, for type checkers: `fire` answers them with `RayHits`."""
 
+AreaParts = tuple[Rounds[Any] | None, Spread[Any] | None, AreaWeapon]
+"""Burst, spread, and pattern of an area weapon."""
+
 RayParts = tuple[Rounds[Any] | None, Spread[Any] | Sweep | None, RayWeapon]
 """Burst, spread or sweep, and ray of a ray weapon."""
 
-Parts = tuple[tuple[Rounds[Any] | None, Spread[Any] | None, AreaWeapon] | None, RayParts | None]
-"""Burst, spread and pattern of an area weapon, or None; and those of a ray weapon, or None."""
+Parts = tuple[AreaParts | None, RayParts | None]
+"""Parts of a weapon of either family; None of the other."""
 
 KINDS: dict[str, type[Weapon]] = {
     kind.kind: kind
@@ -410,7 +413,7 @@ KINDS: dict[str, type[Weapon]] = {
 }  # fmt: skip
 
 
-def parts_of(weapon: Weapon) -> tuple[Rounds[Any] | None, Spread[Any] | None, AreaWeapon]:
+def parts_of(weapon: Weapon) -> AreaParts:
     """Burst, spread and pattern of an area weapon."""
     parts = _parts_of(weapon)[0]
     if parts is None:
@@ -419,13 +422,13 @@ def parts_of(weapon: Weapon) -> tuple[Rounds[Any] | None, Spread[Any] | None, Ar
     return parts
 
 
-def ray_parts_of(weapon: Weapon) -> tuple[Rounds[Any] | None, Spread[Any] | Sweep | None, RayWeapon] | None:
+def ray_parts_of(weapon: Weapon) -> RayParts | None:
     """Burst, spread or sweep, and ray of a ray weapon; None for other weapons."""
     return _parts_of(weapon)[1]
 
 
-def rays_in(parts: RayParts) -> int:
-    """Number of rays of a shot."""
+def pellets_in(parts: AreaParts | RayParts) -> int:
+    """Number of patterns or rays of a shot: the pellets of all rounds."""
     burst, several, _ = parts
     return (burst.count if burst else 1) * (several.count if several else 1)
 
@@ -435,7 +438,7 @@ def are_followed(parts: RayParts) -> bool:
     burst, several, ray = parts
     if burst is None and several is None:
         return not is_stepped(ray)
-    return rays_in(parts) <= FOLLOWED_MOST and ends_at_first(ray)
+    return pellets_in(parts) <= FOLLOWED_MOST and ends_at_first(ray)
 
 
 def _parts_of(weapon: object) -> Parts:

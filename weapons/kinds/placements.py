@@ -5,7 +5,6 @@ No state is kept, so any shot of a batch can be fired again alone, in any order,
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, TypeVar
@@ -19,10 +18,10 @@ from hitplanes.planes.common.limits import ALL, CATEGORY_BITS, EVERYTHING, POSIT
 from hitplanes.planes.grid import fixed_point
 from hitplanes.planes.grid.fixed_point import ONE, Whole, pixel, snap, turned, unit, unit_of, unit_toward
 from hitplanes.planes.grid.spans import Columns, row_order
-from hitplanes.planes.scene.poses import one_place, points
+from hitplanes.planes.scene.poses import is_angle, one_place, points
 
 from .. import late
-from .areas import AreaWeapon, Spread, check_aimed, parts_of, pattern_of, patterns_of
+from .areas import AreaWeapon, Spread, check_aimed, parts_of, pattern_of, patterns_of, pellets_in
 from .weapon import PatternTable, Weapon
 
 C = TypeVar("C", bound="ShotColumns")
@@ -398,8 +397,7 @@ def _spread(column: Ints | int | tuple[int, ...] | None, n: int) -> Ints:
 
 def placements_of(weapon: Weapon) -> int:
     """Number of placements of one shot: the pellets of all rounds."""
-    burst, spread, _ = parts_of(weapon)
-    return (burst.count if burst else 1) * (spread.count if spread else 1)
+    return pellets_in(parts_of(weapon))
 
 
 def placements_for(weapon: Weapon, shots: Shots) -> Placements:
@@ -446,8 +444,7 @@ def distinct_patterns(plain: AreaWeapon, direction: Ints | tuple[int, int]) -> t
 def _angles(n: int, aim: object) -> Floats | float:
     """Angles (n,) of aims, degrees, or one for all shots."""
     if isinstance(aim, int | float):
-        plain = math.isfinite(aim) if type(aim) is float else type(aim) is int and -POSITION_MAX <= aim <= POSITION_MAX
-        return float(aim if plain else reals("aim", aim, ()))
+        return float(aim if is_angle(aim) else reals("aim", aim, ()))
     return reals("aim", each("aim", aim, n), (n,))
 
 

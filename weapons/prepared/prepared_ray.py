@@ -25,7 +25,7 @@ from hitplanes.planes.scene.scene import Scene
 from .. import late
 from ..fire.hits import HitRow
 from ..fire.prefilter import filters_of
-from ..kinds.areas import RayParts, Spread, rays_in
+from ..kinds.areas import RayParts, Spread, pellets_in
 from ..kinds.placements import STRAIGHT, ZEROS, pellets_of
 from ..kinds.rays import RayWeapon, Sweep, unspent
 from ..kinds.weapon import Weapon
@@ -238,7 +238,7 @@ class ReadyRays(ReadyRay):
 
     def __init__(self, scene: Scene, weapon: Weapon, kept: Filter, parts: RayParts) -> None:
         super().__init__(scene, weapon, kept, parts[2])
-        self._parts, self.rays = parts, rays_in(parts)
+        self._parts, self.rays = parts, pellets_in(parts)
         burst, several, _ = parts
         self._turns = [unit_of(burst.recoil_deg * k) for k in range(burst.count)] if burst else [STRAIGHT]
         self._shift: list[int] = snap(burst.recoil_xy).tolist() if burst else [0, 0]

@@ -25,7 +25,7 @@ from ..fire.hits import Rows
 from ..fire.plan import Plan, leave_out_absent, leave_out_imagery, read_stack
 from ..fire.prefilter import Candidates, may_refuse, view_of
 from ..fire.strategy import AUTO, RAY_WAYS, RayChoice, are_faster_alone, chosen_candidates, chosen_ray_way
-from ..kinds.areas import RayParts, rays_in
+from ..kinds.areas import RayParts, pellets_in
 from ..kinds.placements import Shots
 from ..kinds.rays import RayWeapon, ends_at_first, is_thin_first
 from ..kinds.weapon import Weapon
@@ -68,7 +68,7 @@ def fired_rays(
 ) -> RayHits:
     """Decide what shots of a ray weapon hit; `how` is (prefilter, broadphase, strategy) of `fire`."""
     ray = parts[2]
-    each = rays_in(parts)
+    each = pellets_in(parts)
     through, chosen, choose = _planned(scene, ray, view_of(False, shots), each * len(shots), how, plan)
     step = max(1, RAYS_AT_ONCE // each)
     rows: list[Rows] = []
