@@ -107,7 +107,7 @@ WORDS_AT_ONCE = 2**16
 """Words of pairs worked on at a time: 512 KB; with fewer, calls take longer, with more, the caches overflow."""
 
 _FULL = np.uint64(2**64 - 1)
-PAST_LAST = np.array([[0], [1]])  # added to the first and last pixels of runs, makes them half-open
+_PAST_LAST = np.array([[0], [1]])  # added to the first and last pixels of runs, makes them half-open
 
 
 class PatternBits(NamedTuple):
@@ -187,7 +187,7 @@ def columns_of(spans: Spans) -> Words:
 
 def words_of(ends: Ints, column: Ints) -> Words:
     """Words (..., k, columns) of runs with first and last pixels (..., 2, k), given the columns of their bits 0."""
-    bits = (ends + PAST_LAST)[..., None] - column
+    bits = (ends + _PAST_LAST)[..., None] - column
     shifted: Words = _FULL << np.minimum(np.maximum(bits, 0, out=bits), WORD, out=bits).view(np.uint64)
     return shifted[..., 0, :, :] & ~shifted[..., 1, :, :]  # by 64 all is shifted out
 

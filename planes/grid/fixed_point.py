@@ -59,7 +59,7 @@ _FIXED_BITS = 160  # as exact as _PI
 FEW_ANGLES = 24  # most angles that are split one after another, which takes less time than the calls of numpy
 ANGLES_KEPT = 2**12  # angles whose directions are kept: objects turn by the same steps again and again
 
-EXACT_ROOT = 2**52  # up to it the float root of a number below a square lies below the square's root
+EXACT_ROOT = 2**52  # up to it the float root, rounded down, is exact
 DIGIT, DIVISORS_MOST = 20, 2**40
 """Bits of a digit of `muldiv`, and divisors of which a remainder, and a digit more, have room in int64."""
 
