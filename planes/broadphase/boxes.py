@@ -9,15 +9,15 @@ Searches read rows by `take` and `flatnonzero`: indexing by brackets takes up to
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
 from ..common.checks import Bools, Floats, InputError, Ints, array_of, choice, integers, reals, shown
-from ..common.limits import CHUNK_PAIRS, INDEX_SLACK, STRUCTURES
-from ..grid.spans import meets, sorted_once
+from ..common.limits import CHUNK_PAIRS, CHUNK_SAMPLES, INDEX_SLACK, STRUCTURES
+from ..grid.spans import meets, pieces, ragged, sorted_once
 from ..scene.derived import Derivative
 from ..scene.items import Items
 from ..volumes.volumes import Aabbs, Volumes
@@ -62,6 +62,19 @@ def sorted_pairs(first: Ints, second: Ints, n: int, once: bool = False) -> Ints:
 def piled(found: Sequence[Pairs]) -> Ints:
     """Join lists of pairs: (2, K) int64."""
     return np.concatenate([np.empty((2, 0), np.int64), *(np.stack(piece) for piece in found)], axis=1)
+
+
+def listed(
+    query: Ints, start: Ints, length: Ints, entry: Ints, there: Callable[[Ints], Bools] | None = None
+) -> Iterator[Pairs]:
+    """Every (query, box) of runs (n,) of a list of boxes, some at a time; of all boxes, or of those that are there."""
+    for piece in pieces(length, CHUNK_SAMPLES):
+        group, place = ragged(length[piece])
+        asked, box = query[piece].take(group), entry.take(start[piece].take(group) + place)
+        if there is not None:
+            kept = np.flatnonzero(there(box))
+            asked, box = asked.take(kept), box.take(kept)
+        yield asked, box
 
 
 class Cells(NamedTuple):
@@ -219,11 +232,12 @@ class BroadPhase(ABC):
         """Write new rows into the table and update the structure."""
         self._rows[ids] = rows
 
-    def _meeting(self, queries: Floats, query: Ints, ids: Ints, work: Work | None) -> Bools:
-        """Test candidates against the present boxes."""
+    def _meeting(self, queries: Floats, query: Ints, ids: Ints, work: Work | None) -> Pairs:
+        """The candidates whose present boxes overlap the query."""
         if work is not None:
             work.tests.append((query, ids))
-        return meets(queries.take(query, axis=0), self._rows.take(ids, axis=0))
+        good = np.flatnonzero(meets(queries.take(query, axis=0), self._rows.take(ids, axis=0)))
+        return query.take(good), ids.take(good)
 
     def _meeting_all(self, queries: Floats, which: Ints, ids: Ints, work: Work | None) -> list[Pairs]:
         """Test every named query against every named box, some millions of pairs at a time."""

@@ -11,8 +11,8 @@ import numpy as np
 
 from ..common.checks import Bools, Floats, InputError, Ints, integers, real
 from ..common.limits import BVH_LEAF, BVH_SMALL, CHUNK_SAMPLES
-from ..grid.spans import begins, meets, pieces, ragged, sorted_once
-from .boxes import LARGEST, BroadPhase, Cells, Pairs, Work, box_rows, sorted_pairs
+from ..grid.spans import begins, meets, ragged, sorted_once
+from .boxes import LARGEST, BroadPhase, Cells, Pairs, Work, box_rows, listed, sorted_pairs
 
 
 class Tree:
@@ -150,17 +150,9 @@ class Bvh(BroadPhase):
         return sum(len(nodes) for each in before for nodes in each.levels) + sum(map(len, tree.levels[:level]))
 
     def _in_leaves(self, tree: Tree, queries: Floats, query: Ints, leaf: Ints, work: Work | None) -> list[Pairs]:
-        found: list[Pairs] = []
-        length = tree.starts[leaf + 1] - tree.starts[leaf]
-        for piece in pieces(length, CHUNK_SAMPLES):
-            group, place = ragged(length[piece])
-            box = tree.ids.take(tree.starts[leaf[piece]].take(group) + place)
-            asked = query[piece].take(group)
-            if tree.gone:
-                asked, box = asked[box >= 0], box[box >= 0]
-            good = np.flatnonzero(self._meeting(queries, asked, box, work))
-            found.append((asked.take(good), box.take(good)))
-        return found
+        start, there = tree.starts[leaf], (lambda box: box >= 0) if tree.gone else None
+        pairs = listed(query, start, tree.starts[leaf + 1] - start, tree.ids, there)
+        return [self._meeting(queries, asked, box, work) for asked, box in pairs]
 
     def _enter(self, ids: Ints) -> None:
         while self._trees and len(self._trees[-1].living) <= max(2 * len(ids), BVH_SMALL):

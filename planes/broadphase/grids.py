@@ -13,7 +13,7 @@ import numpy as np
 from ..common.checks import Floats, InputError, Ints, integer, integers, real
 from ..common.limits import CHUNK_SAMPLES, GRID_FRESH, OVERSIZED_CELLS
 from ..grid.spans import begins, pieces, ragged
-from .boxes import LARGEST, BroadPhase, Cells, Pairs, Work, sorted_pairs
+from .boxes import LARGEST, BroadPhase, Cells, Pairs, Work, listed, sorted_pairs
 
 NOWHERE, BESIDE, MAIN, FRESH = range(4)
 """Where a box is listed: not at all, in the list of oversized boxes, in the sorted cells, in the fresh entries."""
@@ -182,17 +182,10 @@ class Grid(BroadPhase):
         if work is not None:
             before = len(self._listings[0].key) if home == FRESH else 0
             work.visits.append((query, before + np.searchsorted(listing.start, start)))
-        found: list[Pairs] = []
-        for piece in pieces(length, CHUNK_SAMPLES):
-            group, place = ragged(length[piece])
-            box, asked = listing.entry.take(start[piece].take(group) + place), query[piece].take(group)
-            if home == MAIN and self._stale:
-                keep = np.flatnonzero(self._home.take(box) == MAIN)
-                box, asked = box.take(keep), asked.take(keep)
-            asked, box = sorted_pairs(asked, box, self._count, once=True)
-            good = np.flatnonzero(self._meeting(queries, asked, box, work))
-            found.append((asked.take(good), box.take(good)))
-        return found
+        there = (lambda box: self._home.take(box) == MAIN) if home == MAIN and self._stale else None
+        pairs = listed(query, start, length, listing.entry, there)
+        once = (sorted_pairs(asked, box, self._count, once=True) for asked, box in pairs)
+        return [self._meeting(queries, asked, box, work) for asked, box in once]
 
     def _enter(self, ids: Ints) -> None:
         ids = self._measured(ids)

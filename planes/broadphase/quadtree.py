@@ -20,8 +20,8 @@ import numpy.typing as npt
 
 from ..common.checks import Bools, Floats, InputError, Ints, integer
 from ..common.limits import CHUNK_SAMPLES, QUADTREE_CAPACITY, QUADTREE_DEPTH
-from ..grid.spans import pieces, ragged, sorted_once
-from .boxes import LARGEST, BroadPhase, Cells, Pairs, Work, piled, sorted_pairs
+from ..grid.spans import ragged, sorted_once
+from .boxes import LARGEST, BroadPhase, Cells, Pairs, Work, listed, piled, sorted_pairs
 
 Nodes = dict[str, npt.NDArray[Any]]  # rows of nodes, one array per field of FIELDS
 
@@ -115,13 +115,9 @@ class Quadtree(BroadPhase):
         length = self._nodes["length"].take(leaf)
         filled = np.flatnonzero(length)
         query, leaf, length = query.take(filled), leaf.take(filled), length.take(filled)
-        for piece in pieces(length, CHUNK_SAMPLES):
-            group, place = ragged(length[piece])
-            box = self._pool.take(self._nodes["start"].take(leaf[piece]).take(group) + place)
-            asked = query[piece].take(group)
-            good = np.flatnonzero(self._meeting(queries, asked, box, work))
-            asked, box = sorted_pairs(asked.take(good), box.take(good), self._count, once=True)
-            found.append((asked, box))
+        for asked, box in listed(query, self._nodes["start"].take(leaf), length, self._pool):
+            first, second = sorted_pairs(*self._meeting(queries, asked, box, work), self._count, once=True)
+            found.append((first, second))
         return found
 
     def _enter(self, ids: Ints) -> None:
