@@ -101,12 +101,6 @@ class _Kept(NullCache):  # type: ignore[misc]
     def __init__(self, kernel: Callable[..., Any]) -> None:
         self._kernel = kernel
 
-    @property
-    def cache_path(self) -> str | None:
-        """The folder of the files."""
-        folder = _folder()
-        return None if folder is None else str(folder)
-
     def load_overload(self, signature: Any, target_context: Any) -> Any:
         """Machine code for types of arguments, or None."""
         target_context.refresh()
