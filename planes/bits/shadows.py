@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -28,7 +29,7 @@ import numpy as np
 from ..common.backend import kernels_of
 from ..common.checks import Bools, Floats, Ints
 from ..common.limits import CHUNK_PAIRS, CHUNK_SAMPLES
-from ..grid.spans import begins, each_pixel, merged_runs, pieces, ragged, sorted_once
+from ..grid.spans import Columns, begins, each_pixel, merged_runs, pieces, ragged, sorted_once
 from .bit_rows import WORD, Words
 from .blockers import Blockers
 from .cells import met_boxes
@@ -398,7 +399,8 @@ def _columns(first: Floats, last: Floats, left: Ints) -> Words:
     return words
 
 
-class Shelter(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Shelter(Columns):
     """What shelters samples from the origins of their placements, as columns.
 
     Parameters
@@ -409,11 +411,6 @@ class Shelter(NamedTuple):
 
     items: Ints
     ranks: Ints
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes of the columns."""
-        return self.items.nbytes + self.ranks.nbytes
 
     def hides(self, sample: Ints, rank: Ints) -> Bools:
         """Whether an item other than that of a rank (n,), or of one for all, shelters a sample (n,)."""
