@@ -75,7 +75,8 @@ def nearest(met: Words, left: Ints, top: Ints) -> tuple[Ints, Ints, Ints]:
     down = row + top
     step = np.sqrt((distance2 - down * down).astype(np.float64)).astype(np.int64)  # of a square that a float holds
     step -= across
-    return distance2, away + _aside(met[np.arange(len(met)), row], column, step), down
+    before = (met[np.arange(len(met)), row] >> (column - step).view(np.uint64)) & _BIT  # of two it comes first
+    return distance2, away + np.where(before, -step, step), down
 
 
 def _steps(words: Words, column: Ints) -> Ints:
@@ -95,12 +96,6 @@ def _steps(words: Words, column: Ints) -> Ints:
     np.subtract(1023 + WORD - 1, exponent, out=exponent)
     np.minimum(exponent, np.bitwise_count(after), out=exponent)
     return exponent
-
-
-def _aside(words: Words, column: Ints, step: Ints) -> Ints:
-    """Offset (n,) of a pixel that lies `step` from a column: before it if there is one, else after."""
-    before = (words >> (column - step).view(np.uint64)) & _BIT
-    return np.where(before, -step, step)
 
 
 WORDS_AT_ONCE = 2**16

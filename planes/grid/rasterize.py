@@ -404,15 +404,14 @@ class Lines:
         first = np.maximum(np.floor((np.minimum(*ends) - half - 1) / SUB).astype(np.int64), top)
         last = np.minimum(np.ceil((np.maximum(*ends) + half + 1) / SUB).astype(np.int64), low)
         line, row = _ragged_rows(first, np.where(left <= right, last, first - 1))
-        first, last = (self._thick_runs if self.radius else _thin_runs)(u, v, along, aside, line, row)
+        if self.radius:  # cells at most `wide_sides` from the infinite axis
+            across, side = (u * aside - v * along)[line] + (SUB * along)[line] * row, self.wide_sides[line]
+            first, last = runs_between(across - side, across + side, aside[line])
+        else:
+            first, last = _thin_runs(u, v, along, aside, line, row)
         first, last = np.maximum(first, left[line]), np.minimum(last, right[line])
         kept = np.flatnonzero(first <= last)
         return line[kept], row[kept], first[kept], last[kept]
-
-    def _thick_runs(self, u: Ints, v: Ints, along: Ints, aside: Ints, line: Ints, row: Ints) -> tuple[Ints, Ints]:
-        """Cells at most `wide_sides` from the infinite axes of segments, in rows."""
-        across, side = (u * aside - v * along)[line] + (SUB * along)[line] * row, self.wide_sides[line]
-        return runs_between(across - side, across + side, aside[line])
 
     def times(self, line: Ints, x: Ints, y: Ints) -> tuple[Ints, Ints]:
         """Times at which segments enter and leave cells; a cell that is not touched is left before it is entered."""

@@ -195,7 +195,11 @@ class MaskAtlas:
             if uid not in self.offsets:
                 new[uid] = variant.mask.reshape(-1)
         if new:
-            self._append(new)
+            *begin, end = accumulate((mask.size for mask in new.values()), initial=self.used)
+            self.offsets.update(zip(new, begin, strict=True))
+            with LAYING_OUT:
+                self.later += new.values()
+                self.used = end
         return [self.offsets[variant.uid] for variant in variants]
 
     def drop(self, variant: Variant) -> None:
@@ -210,15 +214,6 @@ class MaskAtlas:
     def wasteful(self) -> bool:
         """Whether more than half of the array, beyond some slack, is unused."""
         return self.used > 2 * self.live + ATLAS_SLACK_BYTES
-
-    def _append(self, masks: dict[int, Bools]) -> None:
-        """Store flat masks, by their numbers."""
-        sizes = [mask.size for mask in masks.values()]
-        ends = list(accumulate(sizes, initial=self.used))
-        self.offsets.update(zip(masks, ends, strict=False))
-        with LAYING_OUT:
-            self.later += masks.values()
-            self.used = ends[-1]
 
     def _lay_out(self) -> None:
         """Write the masks that came later."""
