@@ -14,6 +14,7 @@ import numpy as np
 from hitplanes.planes.common.backend import keep_arena, news
 from hitplanes.planes.common.checks import InputError, Ints, choice, each, kind_of, reals, shown
 from hitplanes.planes.common.limits import ALL
+from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
 from .. import late
@@ -296,7 +297,7 @@ def fired(scene: Scene, weapon: Weapon, shots: Shots, how: How = AUTO, plan: Pla
 
 def _fired_areas(scene: Scene, weapon: Weapon, shots: Shots, how: How, plan: Plan) -> Hits:
     """Decide what shots of an area weapon hit, by the way that the strategy chooses."""
-    request = _request_of(scene, weapon, shots, how, plan)
+    request = request_of(scene, read_stack(scene, plan), weapon, shots, how, plan)
     way, why = chosen_way(how[2], request)
     plan.run("plan", f"{way.name}: {why}")
     parts = way.engine(request)
@@ -308,9 +309,9 @@ def _fired_areas(scene: Scene, weapon: Weapon, shots: Shots, how: How, plan: Pla
     return hits
 
 
-def _request_of(scene: Scene, weapon: Weapon, shots: Shots, how: How, plan: Plan) -> Request:
+def request_of(scene: Scene, stack: Stack, weapon: Weapon, shots: Shots, how: How, plan: Plan) -> Request:
     """What a call asks of an area weapon, and what its shots are tested against."""
-    stack, traits = read_stack(scene, plan), traits_of(weapon)
+    traits = traits_of(weapon)
     view, placements, blockers = view_of(traits.pierces, shots), traits.placements * len(shots), None
     if traits.sight:
         near = late.shelter.ways_box(weapon, shots)

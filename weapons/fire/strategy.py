@@ -51,13 +51,14 @@ class Way(NamedTuple):
     ----------
     name : by which it is asked for
     refuses : why it cannot serve a call, or ""
-    cost : ns that the call takes, and ns to make what it needs of the scene and is not there
+    cost : ns that the call takes, and ns to make what it needs of the scene and is not there, by the expected number of
+        tiles near all placements
     engine : returns rows, in parts
     """
 
     name: str
     refuses: Callable[[Request], str]
-    cost: Callable[[Request], tuple[float, float]]
+    cost: Callable[[Request, float], tuple[float, float]]
     engine: Callable[[Request], list[Rows]]
 
 
@@ -84,10 +85,10 @@ def _near(request: Request) -> float:
     return request.placements * expected_near(stack, request.traits.reach)
 
 
-def _tiles_cost(request: Request) -> tuple[float, float]:
+def _tiles_cost(request: Request, near: float) -> tuple[float, float]:
     now = costs()
     each = now.tiles_placement + tiles_in(request.stack) * now.tiles_pair
-    return now.tiles_call + request.placements * each + _near(request) * now.tiles_near, 0.0
+    return now.tiles_call + request.placements * each + near * now.tiles_near, 0.0
 
 
 def _visible_refuse(request: Request) -> str:
@@ -96,11 +97,11 @@ def _visible_refuse(request: Request) -> str:
     return "a pre-filter is asked for" if request.filtered else _tiles_refuse(request)
 
 
-def _visible_cost(request: Request) -> tuple[float, float]:
+def _visible_cost(request: Request, near: float) -> tuple[float, float]:
     now, scene = costs(), request.scene
     known = request.view is not None and scene.derived.visible(request.view).made(scene.items) is not None
     made = 0.0 if known else visible_ns(request.stack, now)
-    return now.visible_call + request.placements * now.visible_placement + _near(request) * now.visible_near, made
+    return now.visible_call + request.placements * now.visible_placement + near * now.visible_near, made
 
 
 SIGHTED = "the weapon needs a line of sight"
@@ -119,7 +120,7 @@ def _labels_refuse(request: Request) -> str:
     return "" if plane is not None else "the scene has no bounds that fit one plane"
 
 
-def _labels_cost(request: Request) -> tuple[float, float]:
+def _labels_cost(request: Request, _: float) -> tuple[float, float]:
     plane = labels_for(request)
     assert plane is not None  # else it refuses
     return costs().labels_call, _drawing_ns(plane, request.scene, request.stack)
@@ -148,7 +149,7 @@ def _integers_refuse(request: Request) -> str:
     return "" if few and request.placements * len(request.stack) <= INTEGERS_PAIRS else "there are too many shots"
 
 
-def _integers_cost(request: Request) -> tuple[float, float]:
+def _integers_cost(request: Request, _: float) -> tuple[float, float]:
     size, now = 2 * request.traits.reach + 1, costs()
     each = now.integers_placement + integers_ns(expected_near(request.stack, request.traits.reach), size, size)
     return now.integers_call + request.placements * each, 0.0
@@ -163,7 +164,7 @@ WAYS = (
     Way("labels", _labels_refuse, _labels_cost, by_labels),
     Way("visible", _visible_refuse, _visible_cost, by_visible_set),
     Way("tiles", _tiles_refuse, _tiles_cost, by_tiles),
-    Way("spans", lambda _: "", lambda request: (0.0 if _tiles_refuse(request) else inf, 0.0), _by_spans),
+    Way("spans", lambda _: "", lambda request, _: (0.0 if _tiles_refuse(request) else inf, 0.0), _by_spans),
 )
 """All ways of areas. The reference costs more than any other, so it is chosen only where bit rows do not serve."""
 
@@ -188,11 +189,11 @@ def chosen_way(strategy: str, request: Request) -> tuple[Way, str]:
 
 def _cheapest(request: Request, passed_over: str) -> tuple[Way, str]:
     """The way that takes the least time, and why; what it needs of the scene is made by rent or buy."""
-    ready, least, wanted = BY_NAME["spans"], inf, None
+    ready, least, wanted, near = BY_NAME["spans"], inf, None, _near(request)
     for way in WAYS:
         if way.refuses(request):
             continue
-        cost, made = way.cost(request)
+        cost, made = way.cost(request, near)
         if made and wanted is None:
             wanted = way, cost, made
         if not made and cost < least:

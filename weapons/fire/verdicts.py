@@ -40,22 +40,24 @@ def verdicts_of(request: Request, rows: Rows, way: str) -> Ints:
     first = replace(request, candidates=Candidates(items, stack), filtered=False, plan=Plan())  # not that of the call
     if way == "spans" or gone or request.blockers is not None or not request.traits.fits:
         return _by_spans(first)
-    fired, inside, placed = _fired_and_inside(first)
-    first = replace(first, pierce=False, view=request.view and request.view._replace(pierce=False), placed=placed)
+    fired, inside, first.placed = _fired_and_inside(first)
+    first.pierce, first.view = False, first.view and first.view._replace(pierce=False)
     hit = _samples(_rows(first) if request.pierce else rows, len(fired))
     occluded = np.zeros_like(hit)
     if stack.has_occluders:
-        view = first.view and first.view._replace(of_occluders=True)
-        occluded = _samples(_rows(replace(first, view=view, covers=~stack.occluder)), len(fired))
+        first.view, first.covers = first.view and first.view._replace(of_occluders=True), ~stack.occluder
+        occluded = _samples(_rows(first), len(fired))
     met = hit + occluded
     if request.choosy:
-        every = by_tiles(replace(first, choosy=False, covers=NO_FLAGS))
-        met = _samples(Rows.joined(every), len(fired))
-    counts = {
-        Verdict.EMPTY: inside - met, Verdict.OUTSIDE: fired - inside, Verdict.FILTERED: met - hit - occluded,
-        Verdict.OCCLUDED: occluded, Verdict.HIT: hit,
-    }  # fmt: skip
-    return np.stack([counts[verdict] for verdict in OF_PATTERNS], axis=1)
+        first.choosy, first.covers = False, NO_FLAGS
+        met = _samples(Rows.joined(by_tiles(first)), len(fired))
+    counts = np.empty((len(fired), len(OF_PATTERNS)), np.int64)
+    for verdict, samples in (
+        (Verdict.EMPTY, inside - met), (Verdict.OUTSIDE, fired - inside), (Verdict.FILTERED, met - hit - occluded),
+        (Verdict.OCCLUDED, occluded), (Verdict.HIT, hit),
+    ):  # fmt: skip
+        counts[:, verdict] = samples
+    return counts
 
 
 def _samples(rows: Rows, shots: int) -> Ints:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from hitplanes.planes.bits.span_walk import OF_PATTERNS
 from hitplanes.planes.common.backend import cached_attribute
 from hitplanes.planes.common.checks import Ints, integer
 from hitplanes.planes.common.limits import SUB
@@ -20,13 +19,14 @@ from hitplanes.planes.scene.objects import Role
 from hitplanes.planes.scene.scene import Scene
 
 from .. import late
+from ..fire.call import request_of
 from ..fire.hits import HitRow, Hits, Rows
 from ..fire.plan import Plan, absent, unaimed, undrawn
-from ..fire.prefilter import Candidates, QueryContext, may_refuse
+from ..fire.prefilter import may_refuse
+from ..fire.strategy import AUTO
 from ..kinds.areas import parts_of
 from ..kinds.placements import (
     STRAIGHT,
-    Placements,
     Shots,
     accepted_of,
     blocking_of,
@@ -37,9 +37,6 @@ from ..kinds.placements import (
     placements_of,
 )
 from ..kinds.weapon import Pattern, PatternTable, Weapon
-
-if TYPE_CHECKING:
-    from ..fire.spans import SpanHits
 
 REACH_MOST = 500
 """Largest distance of a pixel from that of its round, px; larger patterns are left to `fire`."""
@@ -192,18 +189,9 @@ class OneShot(Hits, list[HitRow]):
     def _checked(self, shot: int) -> int:
         return integer("shot", shot, 0, 0)
 
-    @cached_attribute
-    def _met(self) -> tuple[Placements, SpanHits]:
-        """Placements and span hits of the shot in the snapshot."""
-        present = self._present
-        placements = placements_for(present.weapon, self.shots)
-        candidates = Candidates(present.scene.items, present.stack)
-        pierce = parts_of(present.weapon)[2].pierce
-        context = QueryContext(present.stack, present.bounds, pierce, candidates, self.plan, None)
-        return placements, late.spans.direct(placements, self.shots, context)
-
     def _counted(self) -> Ints:
-        return np.asarray(self._met[1].counts.reshape(1, -1, len(OF_PATTERNS)).sum(axis=1))
+        request = request_of(self.scene, self._stack, self.weapon, self.shots, AUTO, Plan())
+        return late.verdicts.verdicts_of(request, self._rows, "prepared")
 
     @cached_attribute
     def plan(self) -> Plan:
@@ -211,7 +199,7 @@ class OneShot(Hits, list[HitRow]):
         plan = Plan()
         if type(self.scene) is not Scene:
             plan.run("past", "moments of it: 1")
-        plan.run("prepared", "the weapon is ready for the scene; the stages after it ran when they were asked for")
+        plan.run("prepared", "the weapon is ready for the scene")
         if self._arguments[:2] == (None, None):
             plan.leave_out_all(unaimed, self.weapon)
         present, choosy = self._present, may_refuse(self._stack, self.shots)
