@@ -10,6 +10,7 @@ if TYPE_CHECKING:
 
     from .bits import blockers as blockers
     from .bits import distance_field as distance_field
+    from .bits import exits as exits
     from .bits import label_plane as label_plane
     from .bits import shadows as shadows
     from .bits import tiles as tiles
@@ -23,9 +24,9 @@ if TYPE_CHECKING:
     from .volumes import volumes as volumes
 
 _PLACES = (
-    "bits.blockers", "bits.distance_field", "bits.label_plane", "bits.shadows", "bits.tiles", "bits.visible",
-    "broadphase.boxes", "files.scene_folder", "scene.carving", "scene.render", "volumes.fit", "volumes.overlap",
-    "volumes.volumes",
+    "bits.blockers", "bits.distance_field", "bits.exits", "bits.label_plane", "bits.shadows", "bits.tiles",
+    "bits.visible", "broadphase.boxes", "files.scene_folder", "scene.carving", "scene.render", "volumes.fit",
+    "volumes.overlap", "volumes.volumes",
 )  # fmt: skip
 
 

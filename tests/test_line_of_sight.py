@@ -16,6 +16,7 @@ import pytest
 from examples import examples
 from hypothesis import given
 from hypothesis import strategies as st
+from oracle_stack import Item
 from some_of import some_of
 from test_fire import Battle, Placements, expected, items_of, parts_of, rounds_of, some_battle, told
 
@@ -46,7 +47,7 @@ from hitplanes import (
     weapons_of,
 )
 from hitplanes.planes.bits import blockers as blockers_module
-from hitplanes.planes.bits import shadows
+from hitplanes.planes.bits import exits, shadows
 from hitplanes.planes.common.backend import kernels_of
 from hitplanes.planes.grid.spans import rectangles
 from hitplanes.weapons.cli.command import main
@@ -545,11 +546,34 @@ def test_what_a_way_leaves_and_meets_again() -> None:
         ways = rng.integers(-9, 10, (40, 2)).tolist()
         seen += [(k, right, down, has_a_gap(squares, right, down)) for right, down in ways]
     most = max(map(len, items))
-    rects = np.array([[*item, *[shadows.NO_RECT[0]] * (most - len(item))] for item in items])
+    rects = np.array([[*item, *[exits.NO_RECT[0]] * (most - len(item))] for item in items])
     item, x, y, gap = np.array(seen).T
-    found = kernels_of(shadows).left_and_met(rects, item, x, y)
+    found = kernels_of(exits).left_and_met(rects, item, x, y)
     assert found.tolist() == np.flatnonzero(gap).tolist()
     assert 200 < len(found) < 1400 and (x == 0).any() and (y == 0).any()
+
+
+@pytest.mark.parametrize("kind", ["crumbs", "stripes", "checks", "frame"])
+def test_what_lies_behind_an_item_that_ways_begin_in(kind: str) -> None:
+    """All pixels around a mask at once, also those in the directions of its corners, against the pixels on each way."""
+    rng, hidden = np.random.default_rng(11), 0
+    for _ in range(8):
+        mask = rng.random(rng.integers(3, 9, 2)) < 0.6
+        row, column = np.indices(mask.shape)
+        shape = {"stripes": column % 2 == 0, "checks": (column + row) % 2 == 0, "frame": (column == 0) | (row == 0)}
+        mask |= shape.get(kind, mask)
+        down, right = (int(v) for v in rng.permutation(np.argwhere(mask))[0])
+        pixels = frozenset((int(x) - right, int(y) - down) for y, x in np.argwhere(mask))
+        item, entered = Item(0, False, 0, 1, 0, pixels), oracle_shelter.entered
+        x, y = (side.ravel() for side in np.mgrid[-12:13, -12:13])
+        found = exits.behind_exit(rectangles(mask) - np.array([right, down, right, down]), x, y)
+        ways = zip(x.tolist(), y.tolist(), strict=True)
+        expected = [
+            k for k, way in enumerate(ways) if entered(item, (0, 0), way, "ignore_until_exit", None) is not None
+        ]
+        assert found.tolist() == expected
+        hidden += len(found)
+    assert hidden > 500
 
 
 @pytest.mark.usefixtures("jit")

@@ -10,7 +10,7 @@ A mask is covered by rectangles. The pixels of a row behind a rectangle form one
 whole numbers: the segment from (0, 0) to (x, y) meets a box if it is not separated from it by a side of the box or by
 its own line. The item's own pixels hide those behind them; the bare ones, which nothing of the rectangle lies before,
 are told apart. In the rows beyond a connected part of a mask one interval is left, between its outermost corners.
-`jit.bit_rows` has the compiled forms of `hide_behind` and `left_and_met`.
+`jit.bit_rows` has the compiled form of `hide_behind`; `exits` has the items in which ways begin.
 
 References
 ----------
@@ -19,14 +19,13 @@ Ericson, *Real-Time Collision Detection* (2005), 5.3.3 (segment against box).
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from ..common.backend import kernels_of
+from .. import late
 from ..common.checks import Bools, Floats, Ints
 from ..common.limits import CHUNK_PAIRS, CHUNK_SAMPLES
 from ..grid.spans import Columns, begins, each_pixel, merged_runs, pieces, ragged, sorted_once
@@ -53,8 +52,6 @@ so few these cost more than they save.
 """
 
 FULL = np.uint64(2**64 - 1)
-NO_RECT = np.array([[1, 1, -1, -1]])
-"""A rectangle without a pixel, which no way meets."""
 
 
 def ways_met(boxes_xyxy: Ints, origin_xy: Ints, blockers: Blockers) -> Iterator[tuple[Ints, Ints]]:
@@ -103,18 +100,18 @@ def all_ways_met(boxes_xyxy: Ints, origin_xy: Ints, blockers: Blockers) -> tuple
 def begun_in(origin_xy: Ints, blockers: Blockers) -> tuple[Ints, Ints]:
     """Sorted pairs (row, blocker) of origins (n, 2) that lie on a blocker."""
     row, blocker = all_ways_met(np.tile(origin_xy, 2), origin_xy, blockers)
-    begun = _begun(origin_xy[row], blockers, blocker)[0]
-    return row[begun], blocker[begun]
+    inside = begun(origin_xy[row], blockers, blocker)[0]
+    return row[inside], blocker[inside]
 
 
-def _begun(origin_xy: Ints, blockers: Blockers, blocker: Ints) -> tuple[Ints, Ints, Ints, Ints]:
+def begun(origin_xy: Ints, blockers: Blockers, blocker: Ints) -> tuple[Ints, Ints, Ints, Ints]:
     """Ways (k,) that begin in their blocker: (place of the way, rectangles (m, 4), first rectangle, their number)."""
     box = blockers.box_xyxy[blocker]
     near = np.flatnonzero(((box[:, :2] <= origin_xy) & (origin_xy <= box[:, 2:])).all(axis=1))
     place, rects, _ = blockers.rects_of(blocker[near], origin_xy[near])
-    begun = sorted_once(place[_holds_origin(rects)])
-    first = place.searchsorted(begun)
-    return near[begun], rects, first, place.searchsorted(begun, side="right") - first
+    inside = sorted_once(place[_holds_origin(rects)])
+    first = place.searchsorted(inside)
+    return near[inside], rects, first, place.searchsorted(inside, side="right") - first
 
 
 def _holds_origin(rects: Ints) -> Bools:
@@ -245,7 +242,7 @@ def hide_behind(rows: Words, corner_xy: Ints, origin_xy: Ints, blockers: Blocker
     pair, blocker : (k,) sorted pairs of a row of `rows` and a blocker
     """
     if blockers.until_exit:
-        pair, blocker = hide_after_exit(rows, corner_xy, origin_xy, blockers, pair, blocker)
+        pair, blocker = late.exits.hide_after_exit(rows, corner_xy, origin_xy, blockers, pair, blocker)
     corner = corner_xy - origin_xy
     for seen in seen_from(origin_xy[pair], blockers, blocker):
         own, box = pair[seen.place], sides_of(rows) + np.tile(corner, 2)
@@ -273,80 +270,7 @@ def _hide(rows: Words, corner: Ints, own: Ints, seen: Edges | Wedges, which: Int
     rows[own[new]] &= ~np.bitwise_or.reduceat(hidden, new, axis=0)
 
 
-def hide_after_exit(
-    rows: Words, corner_xy: Ints, origin_xy: Ints, blockers: Blockers, pair: Ints, blocker: Ints
-) -> tuple[Ints, Ints]:
-    """Clear the pixels that blockers shelter once the ways that begin in them have left them.
-
-    Parameters are those of `hide_behind`. Returned are the other pairs, of ways that begin elsewhere.
-    """
-    begun, rects, first, count = _begun(origin_xy[pair], blockers, blocker)
-    own, about = pair[begun], np.ceil(np.log2(count)).astype(np.int64)
-    for size in sorted_once(about).tolist():  # blockers of about as many rectangles are looked at together
-        alike = np.flatnonzero(about == size)
-        for part in pieces(np.full(len(alike), rows.shape[1] * WORD), CHUNK_SAMPLES):
-            now = alike[part]
-            _clear_after_exit(rows, corner_xy - origin_xy, own[now], rects, first[now], count[now])
-    return np.delete(pair, begun), np.delete(blocker, begun)
-
-
-def _clear_after_exit(rows: Words, corner_xy: Ints, own: Ints, rects: Ints, first: Ints, count: Ints) -> None:
-    """Clear the pixels of rows `own` that a blocker of each shelters once the way from (0, 0) has left it.
-
-    Parameters
-    ----------
-    corner_xy : (n, 2) pixel of bit 0 of the first row
-    first, count : (k,) the rectangles of the blockers
-    """
-    pair, bit, column = _pixels_of(rows[own])
-    x, y = np.stack([column, bit]) + corner_xy[own[pair]].T
-    place, every = np.arange(count.max()), np.append(rects, NO_RECT, axis=0)
-    step = max(CHUNK_SAMPLES // len(place), 1)
-    for begin in range(0, len(pair), step):
-        now = slice(begin, begin + step)
-        new = begins(pair[now])
-        here, which = pair[now][new], np.cumsum(new) - 1
-        of_pair = every[np.where(place < count[here, None], first[here, None] + place, -1)]
-        hidden = _met_after_exit(of_pair, which, x[now], y[now]) + begin
-        pixels = ~(np.uint64(1) << column[hidden].astype(np.uint64))
-        np.bitwise_and.at(rows, (own[pair[hidden]], bit[hidden]), pixels)
-
-
-def _met_after_exit(rects: Ints, item: Ints, x: Ints, y: Ints) -> Ints:
-    """Pixels (s,) that an item, in which the way to them begins, shelters once the way has left it.
-
-    Parameters are those of `left_and_met`.
-    """
-    again = kernels_of(sys.modules[__name__]).left_and_met(rects, item, x, y)
-    hidden = _times(rects[item[again]].swapaxes(0, 1), x[again], y[again], True)[0].any(axis=0)
-    return np.asarray(again[hidden])
-
-
-def _pixels_of(rows: Words) -> tuple[Ints, Ints, Ints]:
-    """Set bits of words (n, height), as (number, row, column)."""
-    octets = np.ascontiguousarray(rows, "<u8").view(np.uint8)
-    number, row, column = np.unpackbits(octets, axis=1, bitorder="little").reshape(*rows.shape, WORD).nonzero()
-    return number, row, column
-
-
-def left_and_met(rects: Ints, item: Ints, x: Ints, y: Ints) -> Ints:
-    """Pixels (s,) on the way to which from pixel (0, 0) an item is left and met again.
-
-    The rectangles of an item share no pixel, so the parts of the way in them do not overlap. If they are shorter in sum
-    than the way up to the last exit, there is a gap.
-
-    Parameters
-    ----------
-    rects : (B, m, 4) of each item, of which one holds pixel (0, 0)
-    item : (s,) item of each pixel
-    """
-    of_pixel = rects if len(rects) == 1 else rects[item]
-    entry, leave = _spells(of_pixel, x[:, None], y[:, None])
-    inside = np.maximum(leave - entry, 0).sum(axis=1)
-    return np.flatnonzero(inside < np.where(entry <= leave, leave, 0).max(axis=1))
-
-
-def _spells(rects: Ints, x: Ints, y: Ints) -> tuple[Ints, Ints]:
+def spells(rects: Ints, x: Ints, y: Ints) -> tuple[Ints, Ints]:
     """When the ways from pixel (0, 0) to pixels (...) enter and leave rectangles (..., 4); all broadcast.
 
     Times are in units of 1 / (2 max(1, abs(x)) max(1, abs(y))) of the way. One that is not met is left before it is
@@ -460,12 +384,13 @@ def _hidden(
     runs: Runs, origin_xy: Ints, blockers: Blockers, placement: Ints, blocker: Ints
 ) -> tuple[Ints, Ints, Ints, Ints]:
     """Stretches of runs that blockers shelter, as (pair, run, x_first, x_last); those of a pair may overlap."""
-    origin, pair, found = origin_xy[placement], np.arange(len(placement)), []
+    origin, pair = origin_xy[placement], np.arange(len(placement))
+    found: list[tuple[Ints, ...]] = []
     if blockers.until_exit:
-        begun, rects, begin, count = _begun(origin, blockers, blocker)
-        for k, first, number in zip(begun.tolist(), begin.tolist(), count.tolist(), strict=True):
-            found += _hidden_after_exit(runs, placement[k], k, origin[k], rects[first : first + number])
-        pair = np.delete(pair, begun)
+        inside, rects, begin, count = begun(origin, blockers, blocker)
+        for k, first, number in zip(inside.tolist(), begin.tolist(), count.tolist(), strict=True):
+            found += late.exits.hidden_after_exit(runs, placement[k], k, origin[k], rects[first : first + number])
+        pair = np.delete(pair, inside)
     for seen in seen_from(origin[pair], blockers, blocker[pair], len(runs)):
         of = pair[seen.place]
         begin, count = runs.in_rows(placement[of], seen.low + origin[of, 1], seen.high + origin[of, 1])
@@ -495,19 +420,7 @@ def _stretches(
         yield which, low[kept].astype(np.int64) + x[which], high[kept].astype(np.int64) + x[which]
 
 
-def _hidden_after_exit(runs: Runs, placement: int, pair: int, origin_xy: Ints, rects: Ints) -> list[tuple[Ints, ...]]:
-    """Pixels of runs of a placement that a blocker shelters once the way has left it: (pair, run, x_first, x_last)."""
-    own, (left, top) = (runs.placement == placement).nonzero()[0], origin_xy.tolist()
-    found: list[tuple[Ints, ...]] = []
-    for piece in pieces(runs.lengths[own] * len(rects), CHUNK_SAMPLES):
-        run, column = each_pixel(runs.x_first[own[piece]], runs.x_last[own[piece]])
-        run = own[piece][run]
-        hidden = _met_after_exit(rects[None], np.zeros_like(run), column - left, runs.y[run] - top)
-        found.append((np.full(len(hidden), pair), run[hidden], column[hidden], column[hidden]))
-    return found
-
-
-def _times(rects: Ints, x: Ints, y: Ints, until_exit: bool) -> tuple[Bools, Ints]:
+def times(rects: Ints, x: Ints, y: Ints, until_exit: bool) -> tuple[Bools, Ints]:
     """Which rectangles of an item lie on the way from pixel (0, 0) to pixels (s,), and when the way enters them.
 
     Parameters
@@ -522,13 +435,13 @@ def _times(rects: Ints, x: Ints, y: Ints, until_exit: bool) -> tuple[Bools, Ints
     first, last, bare_first, bare_last = shadow(rects, y)
     met = (first <= x) & (x <= last)
     hidden = met & ~((bare_first <= x) & (x <= bare_last))
-    entry, leave = _spells(rects, x, y)
+    entry, leave = spells(rects, x, y)
     if until_exit and len(x):
-        hidden &= entry > _exit_of(np.where(met, entry, NEVER), np.where(met, leave, -1))
+        hidden &= entry > exit_of(np.where(met, entry, NEVER), np.where(met, leave, -1))
     return hidden, entry
 
 
-def _exit_of(entry: Ints, leave: Ints) -> Ints:
+def exit_of(entry: Ints, leave: Ints) -> Ints:
     """When ways (s,) leave an item that they begin in, by the times (m, s) at which they enter and leave its parts."""
     order = np.argsort(entry, axis=0)
     reach = np.maximum.accumulate(np.take_along_axis(leave, order, axis=0), axis=0)
@@ -564,13 +477,13 @@ def sheltered_by(
 
 def _entered(rects: Ints, x: Ints, y: Ints, until_exit: bool) -> Ints:
     """When ways from pixel (0, 0) to pixels (s,) first enter a rectangle that shelters them, as in `_times`."""
-    begun = bool(_holds_origin(rects).any())
-    if begun and not until_exit:
+    inside = bool(_holds_origin(rects).any())
+    if inside and not until_exit:
         return np.zeros_like(x)
     parts = [np.zeros(0, np.int64)]
     step = max(CHUNK_SAMPLES // len(rects), 1)
     for first in range(0, len(x), step):
         now = slice(first, first + step)
-        hidden, entry = _times(rects[:, None], x[now], y[now], begun)
+        hidden, entry = times(rects[:, None], x[now], y[now], inside)
         parts.append(np.where(hidden, entry, NEVER).min(axis=0))
     return np.concatenate(parts)

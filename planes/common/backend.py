@@ -56,6 +56,7 @@ COMPILED = {
     "hitplanes.weapons.kinds.draws": "hitplanes.planes.jit.bit_rows",
     "hitplanes.planes.bits.bit_rows": "hitplanes.planes.jit.bit_rows",
     "hitplanes.planes.bits.shadows": "hitplanes.planes.jit.bit_rows",
+    "hitplanes.planes.bits.exits": "hitplanes.planes.jit.bit_rows",
     "hitplanes.planes.bits.front_to_back": "hitplanes.planes.jit.areas",
     "hitplanes.planes.bits.distance_field": "hitplanes.planes.jit.planes",
     "hitplanes.weapons.rays.raycast": "hitplanes.planes.jit.raycast",

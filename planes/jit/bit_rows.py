@@ -10,7 +10,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from ..bits import shadows
+from .. import late
 from ..bits.bit_rows import NO_STRIPS, NO_SUMS, WORD, PatternBits, Words
 from ..bits.blockers import Blockers
 from ..common.backend import in_parts
@@ -266,7 +266,7 @@ def _left_and_met(rects, item, x, y, again):
 
 
 def left_and_met(rects: Ints, item: Ints, x: Ints, y: Ints) -> Ints:
-    """See `bits.shadows.left_and_met`."""
+    """See `bits.exits.left_and_met`."""
     again = np.empty(len(x), np.int64)
     return again[: _left_and_met(rects, item, x, y, again)]
 
@@ -274,7 +274,7 @@ def left_and_met(rects: Ints, item: Ints, x: Ints, y: Ints) -> Ints:
 def hide_behind(rows: Words, corner_xy: Ints, origin_xy: Ints, blockers: Blockers, pair: Ints, blocker: Ints) -> None:
     """See `bits.shadows.hide_behind`."""
     if blockers.until_exit:
-        pair, blocker = shadows.hide_after_exit(rows, corner_xy, origin_xy, blockers, pair, blocker)
+        pair, blocker = late.exits.hide_after_exit(rows, corner_xy, origin_xy, blockers, pair, blocker)
     bounds = EVERYWHERE if blockers.bounds is None else blockers.bounds
     boxes = np.ascontiguousarray(blockers.box_xyxy)
     _hide_behind(rows, corner_xy, origin_xy, boxes, blockers.begin, blockers.rects, bounds, pair, blocker)
