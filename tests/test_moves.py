@@ -29,7 +29,7 @@ def told(stack: Stack) -> list[Any]:
 
 def worked_out(stack: Stack) -> list[Any]:
     """What a stack works out of its columns, and keeps."""
-    sizes = [size.tolist() for size in stack.sizes] if len(stack) else []
+    sizes = list(stack.sizes) if len(stack) else []
     numbers = stack.numbers.tolist(), stack.rank_by_label.tolist(), stack.is_object.tolist()
     return [stack.has_unmet, stack.has_occluders, stack.width.tolist(), stack.area, numbers, sizes]
 
@@ -158,9 +158,9 @@ def test_the_sizes_of_a_stack_are_its_own() -> None:
     """They depend on where items are."""
     scene = Scene((99, 99))
     ids = [scene.add(np.ones((3, 3), np.bool_), (x, 5)) for x in (4, 9)]
-    assert scene.items.stack().sizes[1].tolist() == [8, 3]
+    assert scene.items.stack().sizes[1] == (8, 3)
     scene.move(ids[1], (24, 15))
-    assert scene.items.stack().sizes[1].tolist() == [23, 13]
+    assert scene.items.stack().sizes[1] == (23, 13)
 
 
 NAN, INF, FAR = float("nan"), float("inf"), 2.0**40

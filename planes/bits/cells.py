@@ -55,7 +55,7 @@ class Cells(NamedTuple):
         return self.begin.nbytes + self.listed.nbytes
 
 
-def is_sparse(sizes: tuple[npt.NDArray[Any], npt.NDArray[Any]], size_wh: Ints) -> bool:
+def is_sparse(sizes: tuple[tuple[float, float], tuple[float, float]], size_wh: Ints) -> bool:
     """Whether a cell that boxes of some size are looked up in lists less than SPARSE of all boxes.
 
     Parameters

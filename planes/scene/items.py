@@ -7,14 +7,13 @@ import threading
 from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from struct import Struct
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .. import late
-from ..common.backend import kernels_of
+from ..common.backend import cached_attribute, kernels_of
 from ..common.checks import Bools, Floats, Ints
 from ..common.limits import CATEGORY_BITS, HALF, JOURNAL_EACH, JOURNAL_FEW, JOURNAL_ROWS, SUB
 from ..grid import fixed_point
@@ -82,7 +81,7 @@ class Stack:
         """Flat booleans of all masks in use."""
         return self.atlas.flat
 
-    @cached_property
+    @cached_attribute
     def _by_id(self) -> tuple[Ints, Ints]:
         """Rising ids, and the rank of each."""
         order = np.argsort(self.ids)
@@ -92,7 +91,7 @@ class Stack:
         """Ranks (n,) of items in the stack by their ids, 0 in front; -1 for ids that are not in it."""
         return looked_up(ids, *self._by_id)
 
-    @cached_property
+    @cached_attribute
     def rank_by_label(self) -> Ints:
         """Rank in the stack of each label, which is a row of `Items` + 1; 0 for labels of no item."""
         ranks = np.zeros(int(self.rows.max(initial=-1)) + 2, np.int64)
@@ -100,7 +99,7 @@ class Stack:
         ranks.flags.writeable = False
         return ranks
 
-    @cached_property
+    @cached_attribute
     def is_object(self) -> Bools:
         """Whether each label, which is a row of `Items` + 1, is of an item that can be hit; label 0 is of no item."""
         objects = np.zeros(len(self.rank_by_label), np.bool_)
@@ -108,7 +107,7 @@ class Stack:
         objects.flags.writeable = False
         return objects
 
-    @cached_property
+    @cached_attribute
     def has_occluders(self) -> bool:
         """Whether any item is an occluder."""
         return bool(self.occluder.any())
@@ -118,38 +117,39 @@ class Stack:
         """Items (M,) that hide others and are not hit: `occluder`; (0,) if there are none."""
         return self.occluder if self.has_occluders else np.zeros(0, np.bool_)
 
-    @cached_property
+    @cached_attribute
     def has_unmet(self) -> bool:
         """Whether any item has no category; every shot refuses such an item."""
         return not self.categories.all()
 
-    @cached_property
+    @cached_attribute
     def width(self) -> Ints:
         """Width of each mask, px."""
         return self.box_xyxy[:, 2] - self.box_xyxy[:, 0] + 1
 
-    @cached_property
+    @cached_attribute
     def area(self) -> int:
         """Pixels of all boxes."""
         return int((self.width * (self.box_xyxy[:, 3] - self.box_xyxy[:, 1] + 1)).sum())
 
-    @cached_property
+    @cached_attribute
     def numbers(self) -> Ints:
         """Number (n + 1,) of the first pixel of each box, if those of all boxes are counted; the last is their sum."""
         height = self.box_xyxy[:, 3] - self.box_xyxy[:, 1] + 1
         return np.concatenate([[0], np.cumsum(self.width * height)])
 
-    @cached_property
-    def mean_wh(self) -> Floats:
+    @cached_attribute
+    def mean_wh(self) -> tuple[float, float]:
         """Mean width and height of the items, px."""
-        return np.asarray((self.box_xyxy[:, 2:] - self.box_xyxy[:, :2]).mean(axis=0) + 1)
+        wide, high = ((self.box_xyxy[:, 2:] - self.box_xyxy[:, :2]).mean(axis=0) + 1).tolist()
+        return wide, high
 
-    @cached_property
-    def sizes(self) -> tuple[Floats, Floats]:
-        """Mean width and height of the items, and width and height of the box around all of them, px."""
-        sides = np.ascontiguousarray(self.box_xyxy.T)
-        around = np.maximum.reduce(sides, axis=1)[2:] - np.minimum.reduce(sides, axis=1)[:2]
-        return self.mean_wh, around + 1.0
+    @cached_attribute
+    def sizes(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Mean width and height of the items, and of the box around them all, px: of many, around SPREAD of them."""
+        boxes = self.box_xyxy[:: (len(self) - 1) // SPREAD + 1].tolist()
+        x, y, x_max, y_max = zip(*boxes, strict=True)
+        return self.mean_wh, (max(x_max) - min(x) + 1.0, max(y_max) - min(y) + 1.0)
 
     def mask(self, rank: int) -> Bools:
         """Mask (h, w) of the item at a rank, 0 in front."""
@@ -164,6 +164,8 @@ def _is_there(boxes: Ints | Box) -> bool:
         return boxes[0] <= boxes[2]
     return bool(len(boxes)) and (boxes.item(0, 0) <= boxes.item(0, 2) or bool((boxes[:, 0] <= boxes[:, 2]).any()))
 
+
+SPREAD = 16  # most items whose places tell how far a stack is spread: an estimate for costs, anew in each frame
 
 NOWHERE = (0, 0, -1, -1)
 Change = tuple[int, Ints | int, Ints | Box, Ints | Box]
@@ -436,7 +438,7 @@ class Items:
         most = min(JOURNAL_ROWS, JOURNAL_FEW + JOURNAL_EACH * self.table.living)
         while self._journal_rows > most:
             version, old, _, _ = self._journal.popleft()
-            self._journal_rows -= np.size(old)
+            self._journal_rows -= 1 if isinstance(old, int) else len(old)
             self._forgotten = version
 
     @property

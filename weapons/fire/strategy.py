@@ -67,7 +67,7 @@ def expected_near(stack: Stack, reach: int) -> float:
     if not len(stack):
         return 0.0
     mean, around = stack.sizes
-    (wide, high), (width, height), reached = mean.tolist(), around.tolist(), 2 * reach + 1
+    (wide, high), (width, height), reached = mean, around, 2 * reach + 1
     across, down = (min(wide, WORD) + reached) / width, (min(high, WORD) + reached) / height
     return float(tiles_in(stack) * min(across, 1.0) * min(down, 1.0))
 

@@ -157,8 +157,8 @@ def _edges(lines: Lines, ray: RayWeapon, through: Range) -> list[float]:
 
 def _pairs_per_px(stack: Stack, radius: int) -> float:
     """Number of boxes that 1 px of a ray is expected to enter if they are spread evenly over the box around all."""
-    mean_wh, world_wh = stack.sizes
-    return len(stack) * float((mean_wh + 2 * radius / SUB).sum() / world_wh.prod())
+    (wide, high), (width, height) = stack.sizes
+    return len(stack) * (wide + high + 4 * radius / SUB) / (width * height)
 
 
 def expected_cells(rays: Rays, ray: RayWeapon, stack: Stack) -> float:
@@ -166,9 +166,9 @@ def expected_cells(rays: Rays, ray: RayWeapon, stack: Stack) -> float:
     if not len(stack):
         return 1.0
     length = float(np.sqrt((rays.step_256**2).sum(axis=1).max(initial=0))) / SUB
-    mean_wh, radius = stack.sizes[0], ray.radius_256
+    (wide, high), radius = stack.mean_wh, ray.radius_256
     pairs = min(_pairs_per_px(stack, radius) * length, len(stack))
-    return 1 + pairs * float(min(mean_wh.prod(), (2 * radius / SUB + 1) * mean_wh.sum()))
+    return 1 + pairs * min(wide * high, (2 * radius / SUB + 1) * (wide + high))
 
 
 def _pairs(
