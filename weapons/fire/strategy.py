@@ -190,6 +190,8 @@ def chosen_way(strategy: str, request: Request) -> tuple[Way, str]:
 def _cheapest(request: Request, passed_over: str) -> tuple[Way, str]:
     """The way that takes the least time, and why; what it needs of the scene is made by rent or buy."""
     ready, least, wanted, near = BY_NAME["spans"], inf, None, _near(request)
+    if not (near or request.traits.is_point or _tiles_refuse(request)) and jit_is_on():
+        return BY_NAME["tiles"], f"{passed_over}so few items can be near that nothing made before would save much"
     for way in WAYS:
         if way.refuses(request):
             continue
