@@ -174,7 +174,7 @@ def fire_anew(
     parts: list[Hits] = []
     plan.run("past", f"moments of it: {len(moments)}")
     for past, rows in moments:
-        parts.append(fired(past, weapon, shots.pick(rows), how, Plan() if parts else plan))
+        parts.append(fired(past, weapon, shots.pick(rows), how, plan))
     if len(parts) == 1:
         return parts[0]
     hits = parts[0].gathered(parts, [rows for _, rows in moments], shots)

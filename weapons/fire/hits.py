@@ -449,7 +449,7 @@ class Hits:
 
         Parameters
         ----------
-        parts, rows : hits of each tick, and the numbers of its shots
+        parts, rows : hits of each tick, which share a plan, and the numbers of its shots
         """
         found = cls(
             cls._gathered_rows(parts, rows),
@@ -457,7 +457,7 @@ class Hits:
             *parts[0]._then(0),
             parts[0].weapon,
             shots,
-            Plan.joined([part.plan for part in parts]),
+            parts[0].plan,
         )
         found._remember(parts, rows)
         return found

@@ -126,15 +126,6 @@ class Plan:
         else:
             known.add(stage)
 
-    @classmethod
-    def joined(cls, plans: Sequence[Plan]) -> Plan:
-        """One plan of several calls in a row: the sum of what ran, and what the first left out."""
-        plan = cls()
-        for stage in (stage for part in plans for stage in part.ran):
-            plan._add(replace(stage))
-        plan._left_out, plan._mark = list(plans[0].left_out), plans[-1]._mark
-        return plan
-
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Plan):
             return NotImplemented

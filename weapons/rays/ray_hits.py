@@ -459,9 +459,8 @@ class RayHits(Hits):
             lambda: Stops.gathered([part.stop for part in rays], rows),
             (lambda: cls._gathered_verdicts(parts, rows)) if all(part._count for part in rays) else None,
         )
-        number, plan = sum(part.rays for part in rays), Plan.joined([part.plan for part in parts])
-        of = *parts[0]._then(0), parts[0].weapon, shots, plan
-        found = cls(cls._gathered_rows(parts, rows), later, number, *of)
+        of = *parts[0]._then(0), parts[0].weapon, shots, parts[0].plan
+        found = cls(cls._gathered_rows(parts, rows), later, sum(part.rays for part in rays), *of)
         found._remember(parts, rows)
         return found
 
