@@ -165,6 +165,17 @@ def front_to_back(
     return hits_of_rounds(_joined(parts), each)
 
 
+def some_rounds(placed: Placed, each: int, rule: Rule, turn: Ints) -> tuple[Placed, Rule]:
+    """The placements of rounds (n,), `each` of a round, and what stops them."""
+    own = turn if each == 1 else (turn[:, None] * each + np.arange(each)).reshape(-1)
+    pattern, x, y = (column[own] for column in placed[:3])
+    if isinstance(rule.meets, np.ndarray):
+        rule = rule._replace(meets=rule.meets[own])
+    if rule.exclude is not None and len(rule.exclude) > 1:
+        rule = rule._replace(exclude=rule.exclude[own])
+    return Placed(pattern, x, y, placed.origin_x[turn], placed.origin_y[turn]), rule
+
+
 def _near(
     placed: Placed, windows: PatternBits, tiles: OrderedTiles, rule: Rule, near: Cells | tuple[Ints, Ints] | None
 ) -> tuple[Near, int]:

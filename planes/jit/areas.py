@@ -10,13 +10,13 @@ from numba import types
 from ..bits import front_to_back as front_to_back_module
 from ..bits.bit_rows import WORD, PatternBits, Placed
 from ..bits.cells import Cells
-from ..bits.front_to_back import OrderedTiles, RoundHits, Rule
+from ..bits.front_to_back import OrderedTiles, RoundHits, Rule, some_rounds
 from ..bits.label_plane import CELL_BITS as COARSE_BITS
 from ..bits.label_plane import Front
 from ..common.checks import Bools, Ints, Labels
 from ..common.costs import COMPILED
 from ..common.limits import HALF
-from ..grid.spans import Box
+from ..grid.spans import Box, sorted_once
 from .bit_rows import (
     ALL,
     BOXES,
@@ -504,7 +504,7 @@ def front_to_back(
     meets, cells = rule.meets, near if isinstance(near, Cells) else NOWHERE
     accepted = NONE if meets is None else np.array([meets]) if isinstance(meets, int) else meets
     found = None
-    if rule.blockers is None and (near is None or isinstance(near, Cells)):
+    if near is None or isinstance(near, Cells):
         least = COMPILED.thread / (each * _placement_ns(len(tiles.rank), cells))
         found = rows_by(
             match, Y + 1, len(placed.origin_x), least, tuple(placed), tuple(windows), tuple(tiles), tuple(cells),
@@ -513,6 +513,11 @@ def front_to_back(
         )  # fmt: skip
     if found is None:
         return front_to_back_module.front_to_back(placed, each, windows, tiles, rule, near)
+    if rule.blockers is not None and found.shape[1]:
+        turn = sorted_once(found[TURN])  # no round hits in sight that hits nothing otherwise
+        placed, rule = some_rounds(placed, each, rule, turn)
+        hits: RoundHits = front_to_back_module.front_to_back(placed, each, windows, tiles, rule, near)
+        return hits._replace(turn=turn[hits.turn])
     several = (found[PIXELS], found[PELLETS]) if each > 1 else (None, None)
     weight = found[WEIGHT] if len(windows.sums) else None
     return RoundHits(found[TURN], found[RANK], found[SAMPLES], found[KEY], found[X], found[Y], weight, *several)
