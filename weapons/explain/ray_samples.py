@@ -28,8 +28,6 @@ from ..rays.ray_walk import Range, touching, trace
 from .samples import Behind, Blocked, Samples, WhyNot, pixels_in, unmet
 
 REACH_BITS = 23  # of a coordinate of a cell: cells lie within 2**22 px of their ray's origin; x, y and ray fit int64
-
-
 CELLS_AT_ONCE = 2**19  # cells of rays counted at a time: 4 MB for each of their columns
 
 
@@ -54,24 +52,14 @@ def key_of_cells(ray: Ints, x: Ints, y: Ints) -> Ints:
     return np.asarray((((ray << REACH_BITS) + y + half) << REACH_BITS) + x + half)
 
 
-class _Keyed:
-    """Index of cells of rays by (ray, x, y); a moving item may put cells beside a projectile's own path."""
+def _places(keys: Ints, wanted: Ints) -> tuple[Ints, Ints]:
+    """Indices of the wanted cells among sorted keys, and their places among the wanted ones.
 
-    def __init__(self, ray: Ints, x: Ints, y: Ints) -> None:
-        self._keys = key_of_cells(ray, x, y)
-        self._order = np.argsort(self._keys)
-
-    def __len__(self) -> int:
-        return len(self._keys)
-
-    def places(self, ray: Ints, x: Ints, y: Ints) -> tuple[Ints, Ints]:
-        """Indices of the wanted cells that exist, and their places among the wanted ones."""
-        wanted = key_of_cells(ray, x, y)
-        if not len(self):
-            return wanted[:0], wanted[:0]
-        at = self._order[np.minimum(np.searchsorted(self._keys, wanted, sorter=self._order), len(self) - 1)]
-        found = np.flatnonzero(self._keys[at] == wanted)
-        return at[found], found
+    A moving item may put cells beside a projectile's own path; they are left out.
+    """
+    at = np.searchsorted(keys, wanted)
+    found = np.flatnonzero(np.append(keys, -1)[at] == wanted)
+    return at[found], found
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,9 +117,11 @@ class RayDetail:
         if most > DETAIL_SAMPLES_MAX:
             raise InputError(f"samples: expected a shot of at most {DETAIL_SAMPLES_MAX} to tell one by one, got {most}")
         ray, xy, entry, _, scale = cells_of(rays.start_256, rays.start_256 + rays.step_256, self.lines.radius)
+        keys = key_of_cells(ray, *(xy - rays.origin_xy[ray]).T)
+        order = np.argsort(keys)
+        keys, ray, xy, entry = keys[order], ray[order], xy[order], entry[order]
         at = xy - rays.origin_xy[ray]
-        every = _Keyed(ray, at[:, 0], at[:, 1])
-        verdict, rank = self._met(every)
+        verdict, rank = self._met(keys)
         if (scale != self.lines.scale).any():  # times of a projectile are fractions of the frame
             beyond = np.asarray(entry / scale[ray] > self.ends.fraction[ray])
         else:
@@ -142,12 +132,12 @@ class RayDetail:
             verdict[outside], rank[outside] = Verdict.OUTSIDE, -1
         blocked = np.zeros(len(ray), np.bool_)
         walls = self.met.take(np.flatnonzero(self.stack.occluder[self.met.rank]))
-        blocked[every.places(walls.ray[walls.pair], walls.x, walls.y)[0]] = True
+        blocked[_places(keys, key_of_cells(walls.ray[walls.pair], walls.x, walls.y))[0]] = True
         return ray, xy, entry, verdict, rank, blocked
 
-    def _met(self, every: _Keyed) -> tuple[Ints, Ints]:
+    def _met(self, keys: Ints) -> tuple[Ints, Ints]:
         """Verdict of each cell, and the rank of the item that decided it; the front-most of several counts."""
-        verdict, rank = np.full(len(every), Verdict.EMPTY, np.int64), np.full(len(every), -1)
+        verdict, rank = np.full(len(keys), Verdict.EMPTY, np.int64), np.full(len(keys), -1)
         skipped = self.every.take(np.flatnonzero(self.refuses | (not self.in_steps)))
         stopped, ends = np.flatnonzero(self.ends.reason == Reason.OCCLUDER), self.ends
         at_stops = stopped, ends.x[stopped], ends.y[stopped], ends.rank[stopped]
@@ -156,7 +146,7 @@ class RayDetail:
             (Verdict.OCCLUDED, at_stops),
             (Verdict.HIT, _back_to_front(self.walked)),
         ):
-            cell, found = every.places(ray, x, y)
+            cell, found = _places(keys, key_of_cells(ray, x, y))
             verdict[cell], rank[cell] = kind, item[found]
         return verdict, rank
 
