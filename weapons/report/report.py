@@ -21,7 +21,7 @@ from hitplanes.planes.scene.history import PastScene
 from hitplanes.planes.scene.objects import Role
 from hitplanes.planes.scene.scene import Scene
 
-from ..explain.samples import Samples, detail_of
+from ..explain.samples import detail_of
 from ..fire.call import fired as fire_checked
 from ..fire.hits import BEFORE, Hits
 from ..fire.spans import context_of
@@ -99,7 +99,7 @@ def rays_json(scene: Scene, hits: RayHits, row: int) -> dict[str, Any]:
     parts = ray_parts_of(hits.weapon)
     assert parts is not None  # its hits are those of rays
     rays = rays_of(parts, hits.shots.take(row, row + 1))
-    stops, passes = hits.stops_at(row), hits.passes_at(row)
+    stops, passes, miss = hits.stops_at(row), hits.passes_at(row), hits.nearest_miss(row)
     numbers = passes.round * (parts[1].count if parts[1] else 1) + passes.pellet
     of = np.searchsorted(numbers, np.arange(len(rays) + 1)).tolist()
     entries = [
@@ -116,11 +116,10 @@ def rays_json(scene: Scene, hits: RayHits, row: int) -> dict[str, Any]:
         }
         for i in range(len(rays))
     ]
-    miss = hits.nearest_miss(row)
-    near = None
-    if miss is not None:
-        ends = {"ray_xy": list(miss.ray_xy), "object_xy": list(miss.object_xy)}
-        near = {**item_json(scene, miss.object), "distance": miss.distance, **ends}
+    near = miss and {
+        **item_json(scene, miss.object),
+        "distance": miss.distance, "ray_xy": list(miss.ray_xy), "object_xy": list(miss.object_xy),
+    }  # fmt: skip
     return {"radius": parts[2].radius_256 / SUB, "rays": entries, "nearest_miss": near}
 
 
@@ -194,13 +193,9 @@ def _again(now: Scene, hits: Hits, shot: int) -> list[dict[str, Any]] | None:
 
 
 FORMAT = "hitplanes-report/1"
-
 SHOTS_MAX = 24  # most shots that are listed one by one; more are summed up as a batch
-
 PLACEMENTS_AT_A_TIME = 2**16
-
 NO_BOXES: Ints = np.zeros((0, 4), np.int64)
-
 NEAR_OUTSIDE = 48  # width of the strip beyond the bounds in which samples are shown, px
 
 
@@ -350,6 +345,7 @@ def _shot(scene: Scene, hits: Hits, weapon: str, row: int) -> dict[str, Any]:
     accept, blocked_by = int(shots.accept[row]), int(shots.blocked_by[row])
     owners = [owner for owner in shots.exclude[row].tolist() if owner >= 0]
     margins, samples = _margins(hits, row), hits.samples_at(row)
+    of_verdict = {verdict: samples.xy[samples.verdict == verdict] for verdict in Verdict}
     cosine, sine = shots.direction[row].tolist()
     sight = not isinstance(hits, RayHits) and parts_of(hits.weapon)[2].line_of_sight is not None
     return {
@@ -377,7 +373,7 @@ def _shot(scene: Scene, hits: Hits, weapon: str, row: int) -> dict[str, Any]:
             }
             for entry in hits.blockers(row)
         ],
-        "samples": _sample_runs(samples),
+        "samples": {verdict.name.lower(): _runs_of(xy) for verdict, xy in of_verdict.items() if len(xy)},
         **({"sheltered": _runs_of(samples.xy[samples.sheltered])} if sight else {}),
         "plan": hits.plan.to_dict(),
         **(rays_json(scene, hits, row) if isinstance(hits, RayHits) else {}),
@@ -389,8 +385,7 @@ def _why_not(scene: Scene, hits: Hits, shot: int, margins: Mapping[int, dict[str
     return [
         {
             **item_json(scene, entry.object),
-            "reason": entry.reason,
-            "samples": entry.samples,
+            **entry._asdict(),
             "by": [{**item_json(scene, item), "samples": n} for item, n in entry.by.items()],
             "distance": round(entry.distance, 3),
             **margins.get(entry.object, {}),
@@ -413,32 +408,15 @@ def _rows(scene: Scene, hits: Hits, shot: int, margins: Mapping[int, dict[str, A
     """Rows of a shot, as JSON; rows of rays have no shares."""
     pixels, rows = hits.pixels_at(shot), hits.of(shot)
     shares = [None] * len(rows) if isinstance(hits, RayHits) else hits.shares(shot)
-    return [
-        {
-            **item_json(scene, row.object),
-            "round": row.round,
-            "samples": row.samples,
-            "pixels": row.pixels,
-            "weight": row.weight,
-            "pellets": row.pellets,
-            "first_xy": list(row.first_xy),
-            "distance2": row.distance2,
-            **(
-                {}
-                if share is None
-                else {"shares": {k: round(v, 6) for k, v in share._asdict().items() if v is not None}}
-            ),
-            **margins.get(row.object, {}),
-            "runs": pixels[row.round, row.object].runs().tolist(),
-        }
-        for row, share in zip(rows, shares, strict=True)
-    ]
-
-
-def _sample_runs(samples: Samples) -> dict[str, list[list[int]]]:
-    """Runs of the pixels of each verdict that occurs, each pixel once under its strongest verdict."""
-    of = {verdict.name.lower(): samples.xy[samples.verdict == verdict] for verdict in Verdict}
-    return {name: _runs_of(xy) for name, xy in of.items() if len(xy)}
+    entries = []
+    for row, share in zip(rows, shares, strict=True):
+        columns = {name: value for name, value in row._asdict().items() if name not in ("shot", "object")}
+        entry = {**item_json(scene, row.object), **columns, "first_xy": list(row.first_xy)}
+        if share is not None:
+            entry["shares"] = {name: round(part, 6) for name, part in share._asdict().items() if part is not None}
+        runs = pixels[row.round, row.object].runs().tolist()
+        entries.append({**entry, **margins.get(row.object, {}), "runs": runs})
+    return entries
 
 
 def _runs_of(xy: Ints) -> list[list[int]]:
