@@ -275,8 +275,7 @@ def parser() -> argparse.ArgumentParser:
     _add_report(commands)
     sub = _command(commands, fire, "fire a log of shots, and write the hits of each", FIRE_HELP, FIRE_EXAMPLES)
     sub.add_argument("shots", type=Path, metavar="SHOTS.jsonl", help="log with one shot a line")
-    text = "where to write the hits; the name ends in .jsonl (default: hits.jsonl)"
-    sub.add_argument("-o", "--output", type=Path, default=Path("hits.jsonl"), metavar="HITS.jsonl", help=text)
+    _add_output(sub, "hits.jsonl", "HITS.jsonl", "where to write the hits; the name ends in .jsonl")
     text = "print the total cost of each stage, and the stages that were skipped"
     sub.add_argument("--plan", action="store_true", help=text)
     sub = _command(commands, new, "write a small scene to start from", NEW_HELP, NEW_EXAMPLES)
@@ -294,24 +293,26 @@ def parser() -> argparse.ArgumentParser:
     _command(commands, warm_up, "compile all kernels of the extra jit", WARM_UP_HELP, "")
     sub = _command(commands, demo, "animate a quadtree, a grid or a BVH", DEMO_HELP, DEMO_EXAMPLES)
     sub.add_argument("kind", choices=SHOWN, metavar="KIND", help=f"one of {', '.join(SHOWN)}")
-    text = "a file that ends in .gif, or a new folder for PNG files (default: demo.gif)"
-    sub.add_argument("-o", "--output", type=Path, default=Path("demo.gif"), metavar="GIF", help=text)
+    _add_output(sub, "demo.gif", "GIF", "a file that ends in .gif, or a new folder for PNG files")
     return top
+
+
+def _add_output(sub: argparse.ArgumentParser, default: str, metavar: str, text: str) -> None:
+    text = f"{text} (default: {default})"
+    sub.add_argument("-o", "--output", type=Path, default=Path(default), metavar=metavar, help=text)
 
 
 def _add_measurements(commands: Any) -> None:
     sub = _command(commands, study, "measure error and run time of all methods", STUDY_HELP, STUDY_EXAMPLES)
     text = "folder with scene.json and its images (default: one shape of each kind)"
     sub.add_argument("scene", type=Path, metavar="SCENE", nargs="?", help=text)
-    text = "a new folder, or that of an earlier study, which is replaced (default: study)"
-    sub.add_argument("-o", "--output", type=Path, default=Path("study"), metavar="FOLDER", help=text)
+    _add_output(sub, "study", "FOLDER", "a new folder, or that of an earlier study, which is replaced")
     text = "largest accepted error: wrong decisions per shot, or error of a share (default: 0.01)"
     sub.add_argument("--error", type=float, default=0.01, metavar="E", help=text)
     sub.add_argument("--quick", action="store_true", help="fewer shots and runs: under half a minute")
     sub.add_argument("--seed", type=int, default=0, metavar="N", help="random seed of the shots (default: 0)")
     sub = _command(commands, stability, "count wrong decisions on hard geometry", STABILITY_HELP, STABILITY_EXAMPLES)
-    text = "a new folder, or that of an earlier run, which is replaced (default: stability)"
-    sub.add_argument("-o", "--output", type=Path, default=Path("stability"), metavar="FOLDER", help=text)
+    _add_output(sub, "stability", "FOLDER", "a new folder, or that of an earlier run, which is replaced")
     text = "a few hundred questions for each cell of the table: seconds instead of half an hour"
     sub.add_argument("--quick", action="store_true", help=text)
     sub.add_argument("--seed", type=int, default=0, metavar="N", help="random seed of the questions (default: 0)")
@@ -326,15 +327,11 @@ def _add_report(commands: Any) -> None:
     sub.add_argument("--aim", type=float, metavar="DEG", help="direction in degrees: 0 is right, 90 is down")
     sub.add_argument("--toward", metavar="X,Y", help="point to aim at, px, instead of --aim")
     sub.add_argument("--seed", type=int, metavar="N", help="random seed of the pellets")
-    text = "file of the picture (default: report.png)"
-    sub.add_argument("-o", "--output", type=Path, default=Path("report.png"), metavar="PNG", help=text)
-    sub.add_argument(
-        "--json", type=Path, metavar="JSON", help="also write the facts to this file; - is the standard output"
-    )
-    text = (
-        "test bounding volumes first, and draw them: none, box, circle, 'oriented box', '4 boxes' (1 to 64), polygon"
-        " or swept"
-    )
+    _add_output(sub, "report.png", "PNG", "file of the picture")
+    text = "also write the facts to this file; - is the standard output"
+    sub.add_argument("--json", type=Path, metavar="JSON", help=text)
+    volumes = "none, box, circle, 'oriented box', '4 boxes' (1 to 64), polygon or swept"
+    text = f"test bounding volumes first, and draw them: {volumes}"
     sub.add_argument("--prefilter", metavar="NAME", help=text)
     text = "find objects with this structure, and draw its cells: grid, quadtree or bvh"
     sub.add_argument("--broadphase", metavar="NAME", help=text)
@@ -529,9 +526,8 @@ def compare(arguments: argparse.Namespace) -> int:
     for other in scenes.keys() - set(hashes):
         raise InputError(f"--scene: expected that of a report, {' or '.join(hashes)}, got {other}")
     if arguments.output is not None:
-        write_png(
-            arguments.output, picture_of_difference(expected, got, (scenes.get(hashes[0]), scenes.get(hashes[1])))
-        )
+        pair = scenes.get(hashes[0]), scenes.get(hashes[1])
+        write_png(arguments.output, picture_of_difference(expected, got, pair))
     lines = differences(expected, got)
     for line in lines or ["no difference"]:
         _say(line)

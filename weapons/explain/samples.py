@@ -245,16 +245,8 @@ def why_not_of(detail: Detail, hit: Set[int]) -> list[WhyNot]:
     boxes = placements.boxes + np.array([-NEAR_PX, -NEAR_PX, NEAR_PX, NEAR_PX])
     near = np.unique(pairs_of(boxes, placements.shot, detail.shots, stack).rank)
     near = near[~stack.occluder[near] & ~np.isin(stack.ids[near], list(hit))]
-    found = [_why(detail, rank, *_apart(detail, rank)) for rank in near.tolist()]
+    found = [_why(detail, rank) for rank in near.tolist()]
     return sorted((why for why in found if why.distance <= NEAR_PX), key=lambda w: (w.distance, w.object))
-
-
-def _apart(detail: Detail, rank: int) -> tuple[float, bool]:
-    """Distance of an object from the pattern, px, by its pixels within the bounds; and whether it has none there."""
-    inside = pixels_in(detail.stack, rank, detail.bounds)
-    pixels = inside if len(inside) else pixels_in(detail.stack, rank, None)
-    distance = 0.0 if len(detail.on(rank)) else math.sqrt(_distance2(detail.runs, pixels))
-    return distance, not len(inside)
 
 
 def detail_of(context: QueryContext, weapon: Weapon, shots: Shots) -> Detail:
@@ -312,15 +304,16 @@ def _inside(events: Events, runs: Runs, bounds: Box | None) -> Events:
     return Events(events.kind, events.rank, events.run, first, last).take(np.flatnonzero(kept))
 
 
-def _why(detail: Detail, rank: int, distance: float, out_of_bounds: bool) -> WhyNot:
-    """Why one object was not hit."""
-    stack, shot = detail.stack, detail.shots
-    on = detail.on(rank)
+def _why(detail: Detail, rank: int) -> WhyNot:
+    stack, on = detail.stack, detail.on(rank)
+    inside = pixels_in(stack, rank, detail.bounds)
+    pixels = inside if len(inside) else pixels_in(stack, rank, None)
+    distance = 0.0 if len(on) else math.sqrt(_distance2(detail.runs, pixels))
     ended = detail.ended[on]
     ranks, counts = np.unique(ended[ended >= 0], return_counts=True)
     by = dict(zip(stack.ids[ranks].tolist(), counts.tolist(), strict=True))
     outside = (detail.verdict[on] == Verdict.OUTSIDE).all()
-    reason = unmet(stack, shot, rank, len(on), out_of_bounds) or ("outside" if outside else "behind")
+    reason = unmet(stack, detail.shots, rank, len(on), not len(inside)) or ("outside" if outside else "behind")
     return WhyNot(int(stack.ids[rank]), reason, len(on), by, distance)
 
 

@@ -186,19 +186,16 @@ def calls_of(requests: Sequence[ShotRequest]) -> Iterator[tuple[list[int], Weapo
     for (weapon, by_angle, owners), places in found.items():
         columns = zip(*(requests[place] for place in places), strict=True)
         _, _, at, aim, toward, accept, blocked_by, exclude, seed, number = columns
-        yield (
-            places,
-            weapon,
-            {
-                "at": np.array(at, np.float64),
-                "aim" if by_angle else "toward": np.array([angle or 0.0 for angle in aim] if by_angle else toward),
-                "accept": np.array(accept),
-                "blocked_by": np.array(blocked_by),
-                "exclude": np.array(exclude) if owners else None,
-                "seed": np.array(seed, np.uint64),
-                "shot": np.array(number, np.int64),
-            },
-        )
+        how = {
+            "at": np.array(at, np.float64),
+            "aim" if by_angle else "toward": np.array([angle or 0.0 for angle in aim] if by_angle else toward),
+            "accept": np.array(accept),
+            "blocked_by": np.array(blocked_by),
+            "exclude": np.array(exclude) if owners else None,
+            "seed": np.array(seed, np.uint64),
+            "shot": np.array(number, np.int64),
+        }
+        yield places, weapon, how
 
 
 def read_lines(log: BinaryIO, count: int) -> list[bytes]:
