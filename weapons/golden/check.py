@@ -170,9 +170,7 @@ GOLDENS = "goldens"  # name of the folder of goldens beside the test files
 FOLDER = "hits-failures"  # folder of failures, in the root of the tests
 PAGE = "index.html"  # page of the failures
 LIST = "files.txt"  # list of the files that belong to us; its first line is MARK
-
 IGNORE = ".gitignore"
-
 MARK = "hitplanes-failures/1: the files listed here are ours, and go with the next run that uses hits_golden"
 
 STYLE = """
@@ -336,7 +334,6 @@ def _listed(folder: Path) -> list[str]:
 
 LINES_MAX, PAGE_LINES_MAX = 20, 500  # most lines of a failure's message, and of its text on the page
 NAME_LETTERS, HASH_DIGITS = 80, 10  # most letters of a file's name, and digits of the hash in it
-
 PLAIN = re.compile(r"[a-z0-9_]+(\[[a-z0-9_.,=+-]*\])?"), re.compile(r"[a-z0-9_]([a-z0-9_.-]*[a-z0-9_])?")
 
 

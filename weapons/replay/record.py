@@ -66,7 +66,6 @@ if TYPE_CHECKING:
 FORMAT = "hitplanes-shots/3"
 WITHOUT_CHAIN = "hitplanes-shots/1"  # oldest format, without chain and end
 ONE_FILTER = ("hitplanes-shots/2", WITHOUT_CHAIN)  # older formats, in which `accept` is the filter of what blocks, too
-
 SEAL = b',"chain":"%b"}\n'
 SEAL_BYTES = len(SEAL % bytes(16))
 HEADER = Keys({"format": Text(), "version": Text()}, ("format", "version"))
@@ -83,10 +82,8 @@ COLUMNS: dict[str, Value] = {
 LINE = Keys(COLUMNS, tuple(name for name in COLUMNS if name not in ("tick", "toward_256")))
 
 AT_ONCE, BYTES_AT_ONCE = 1024, 2**21  # most shots, and about most bytes of lines, of one call; more are no faster
-
 SAME = "all shots do the same again"
 NO_END = "has no end: it was not closed, as after a crash, and may lack shots"
-
 NUMBER_MAX = 2**63  # largest absolute value of a number in a result
 
 

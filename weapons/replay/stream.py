@@ -123,9 +123,7 @@ except ImportError:  # Windows, where two writers of one file are not noticed
 
 HEADER_MAX = 2**20  # bytes that are read of an unexpected header, to name the difference
 SEAL = b',"crc":"%08x"}\n'  # end of a line, with the CRC-32 of all earlier bytes of the file
-
 SEAL_BYTES = len(SEAL % 0)
-
 FLAGS = os.O_RDWR | os.O_CREAT | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
 
 
@@ -287,7 +285,6 @@ SECONDS_SHORT, SECONDS_LONG = 0.1, 0.4
 """After a chunk that took less, the next is four times as large; after one that took more, half as large."""
 
 SUFFIX = ".jsonl"
-
 NOTHING = b'"rows":[],'  # part of the answer to a shot that hit nothing
 
 

@@ -38,7 +38,6 @@ if TYPE_CHECKING:
 
 WIDTH, HEIGHT, LARGEST = 1600, 1200, 24  # largest size of an enlarged view, px, and largest factor
 DIM = 125  # brightness of the scene, of 255
-
 OUTSIDE, HATCH = (18, 19, 22), (200, 212, 230)
 OUTLINES = {
     "hit": ((255, 200, 40), 255),
@@ -51,7 +50,6 @@ OUTLINES = {
 present place of an object that has moved, and of what a shot does not see."""
 
 THIN, DASHED = ("other", "shadow"), ("blocked", "now")
-
 PLUS = np.array([(0, 1, 0), (1, 1, 1), (0, 1, 0)], np.uint8)  # a pixel and its four neighbours
 DASH = 5  # length of the dashes of an outline, px
 DARK = (20, 22, 26)  # ground under thin lines, rings and labels
@@ -263,9 +261,7 @@ def _stripes(shape: tuple[int, ...], period: int, wide: int) -> Bools:
 
 EDGE, TOP = 16, 44  # left edge of the picture on the page, and its top, px
 LINE, COLUMN, NARROWEST, GAP = 19, 464, 1000, 12  # line height, least widths of a card and a page, gap of cards, px
-
 PAGE_GROUND, CARD, INK, FAINT = (24, 26, 30), (35, 38, 44), (238, 240, 244), (158, 164, 174)
-
 LETTER, ENTRY_GAP = 8, 28  # about the width of a letter, and the space around an entry of the legend, px
 SIZE = 0.42  # scale of OpenCV's font, about 8 px a letter
 

@@ -53,10 +53,8 @@ HIT_LINES = 24  # most rows of hits on a card; the JSON has all
 NOT_LINES = 5  # most objects that a card names as blocked or as not hit; the JSON has all
 CELL_WIDTH, NARROW, MANY = 64, 58, 7  # width of a column of numbers, px; and where there are many
 BAR = 9  # height of the bar of verdicts, px
-
 HEADER = ("object hit", "pixels", "pattern", "visible", "mask", "nearest")
 WEIGHT_HEADER = ("object hit", "pixels", "weight", *HEADER[2:])  # with falloff; in samples of full weight
-
 BATCH_HEADER = ("object hit", "shots", "of shots", "pixels", "weight")
 
 

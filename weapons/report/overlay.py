@@ -229,9 +229,7 @@ def draw_present(world: World, report: Mapping[str, Any]) -> Bools:
 NUMBERED_MAX = 3  # most rays of a shot whose entries have numbers and normals
 STEPS_SHOWN = 256  # most tests of a projectile that are drawn, each as a disc
 OF_RAYS = ("filtered", "occluded", "hit")  # whose cells are marked under rays; the arrow shows the empty ones
-
 BADGE_INK = (18, 20, 24)
-
 CLEAR_OF = ("number", "first contact", "goes in", "comes out", "ends: occluder", "ends: budget", "ray")
 """Symbols that a number may not cover."""
 

@@ -95,7 +95,6 @@ def sketch_mark(name: str) -> Image:
 
 
 CASING = 1.5  # width of the dark border of a stroke, px; it makes light lines visible on light ground
-
 DARK, DARK_ALPHA = (14, 16, 20), 190
 
 
@@ -198,7 +197,6 @@ def paint(image: Image, color: Color | Image, alpha: Ints) -> None:
 
 WHITE, ORANGE, BLUE = (255, 255, 255), MARKS["hit"][0], MARKS["occluded"][0]
 MINT, YELLOW = (120, 240, 190), (255, 236, 130)
-
 THROUGH = "in and out of an object"
 
 SIGNS: dict[str, tuple[Color, int, bool]] = {
@@ -226,7 +224,6 @@ ENDS = {"hits": "ends: last hit", "budget": "ends: budget", "occluder": "ends: o
 FINE = 1.4  # width of thin lines, px
 DASH = 6.0  # length of dashes, px
 HEAD = 13.0  # length of the head of an arrow, px
-
 DOT, RING, CROSS, BAR = 3.4, 4.2, 5.5, 8.0
 """Radius of the dot at an entry and of the ring at an exit, half sizes of the cross and the bar at an end, px."""
 

@@ -266,7 +266,6 @@ PATTERN_FAMILIES = _placed(
 Array = npt.NDArray[Any]
 Method = Callable[..., Bools]
 Families = Mapping[str, Make]
-
 APART = 2**22  # px between the areas of two rows; more than twice the reach of any shot
 ABREAST = 32  # areas side by side in x
 

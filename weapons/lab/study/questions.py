@@ -51,8 +51,6 @@ from .methods import (
 
 REACH = 8  # median size of the objects, in radii of the disc
 RADIUS_MAX = 32  # px of a disc; at scale 4 it becomes 128 px, with 51,000 samples per shot
-
-
 SPREAD_PART = 5  # by which blasts are fewer than other shots, as thousands of pellets take long
 
 
