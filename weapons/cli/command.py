@@ -39,9 +39,7 @@ REPORT_HELP = """\
 Fire shots at a scene and draw a picture that shows what was hit and why. --json writes the same facts as JSON.
 By default the shots in scene.json are fired; with --shots those of a log, as fire takes it; with --weapon and --at one
 of your own. More than 24 shots become one heat picture.
-"""
 
-REPORT_EXAMPLES = """\
 examples:
   hitplanes report fixtures/gallery
   hitplanes report fixtures/gallery -o report.png --json report.json
@@ -63,9 +61,7 @@ it answers one shot: {"shot": 0, "of": CRC-32 of its line in the log, "rows": [[
 
 Answers are written to HITS.jsonl.part, which is renamed when it is complete. If a run stops early (an interrupt, a full
 disk, a bad line that you then correct), run the same command again: it continues after the last intact answer.
-"""
 
-FIRE_EXAMPLES = """\
 examples:
   hitplanes fire fixtures/gallery shots.jsonl -o hits.jsonl
   zcat shots.jsonl.gz | hitplanes fire fixtures/gallery /dev/stdin -o hits.jsonl
@@ -78,9 +74,7 @@ Write a small example scene: scene.json and the images that it names. FOLDER mus
 With --from-image the scene is made of a PNG of your own, and is as large as it. If it has transparent pixels, as a
 sprite has, its opaque pixels (alpha over 127) are one object that can be hit. Else, as a screenshot, it is the
 background, and a round target stands in its middle: put what can be hit in its place. A first shot is there.
-"""
 
-NEW_EXAMPLES = """\
 examples:
   hitplanes new range
   hitplanes report range
@@ -92,14 +86,18 @@ Print the differences between two reports. With -o, also draw the reports side b
 only, in the second only, and in both. Versions and plans are not compared.
 
 Exit code: 0 no difference, 1 a difference, 2 bad input.
+
+examples:
+  hitplanes report fixtures/gallery --json before.json
+  hitplanes compare before.json after.json
+  hitplanes compare before.json after.json -o diff.png --scene fixtures/gallery
+  hitplanes compare before.json after.json -o diff.png --scene level/old --scene level/new
 """
 
 DEMO_HELP = """\
 Animate a broad phase. Objects move, its cells split and merge, and a query first finds the cells that it touches, then
 tests the objects in them. The number of tests is shown beside that of brute force.
-"""
 
-DEMO_EXAMPLES = """\
 examples:
   hitplanes demo quadtree
   hitplanes demo grid -o grid.gif
@@ -115,9 +113,7 @@ Writes stability.json, stability.md and, if matplotlib is installed, stability.p
 has counted.
 
 Exit code: 0 hitplanes made no wrong decision, 1 it made one, 2 bad input.
-"""
 
-STABILITY_EXAMPLES = """\
 examples:
   hitplanes stability --quick
   hitplanes stability -o stability/ --seed 7
@@ -137,9 +133,7 @@ If a line of the record was changed, lost, doubled or moved, the record is bad i
 record was not closed (the game crashed), its shots are fired, and a note says that some may be missing.
 
 Exit code: 0 no difference, 1 a result or the content of the scene differs, 2 bad input.
-"""
 
-REPLAY_EXAMPLES = """\
 examples:
   hitplanes replay fixtures/gallery match.jsonl
 """
@@ -152,23 +146,13 @@ on one shape of each kind.
 
 Writes study.json, study.csv, study.md and a diagram for each question (needs pip install 'hitplanes[study]').
 An interrupted run writes what it has measured.
-"""
 
-STUDY_EXAMPLES = """\
 examples:
   hitplanes study --quick
   hitplanes study fixtures/gallery -o study --error 0.05
 """
 
-COMPARE_EXAMPLES = """\
-examples:
-  hitplanes report fixtures/gallery --json before.json
-  hitplanes compare before.json after.json
-  hitplanes compare before.json after.json -o diff.png --scene fixtures/gallery
-  hitplanes compare before.json after.json -o diff.png --scene level/old --scene level/new
-"""
-
-
+Run = Callable[[argparse.Namespace], int | None]  # runs a subcommand, and returns its exit code if that is not 0
 STANDARD_OUTPUT = Path("-")
 NAMED = 8  # most objects that a line of output names
 USAGE_MAX = 300  # characters of a usage error
@@ -273,25 +257,25 @@ def parser() -> argparse.ArgumentParser:
     commands = top.add_subparsers(required=True, metavar="COMMAND")
 
     _add_report(commands)
-    sub = _command(commands, fire, "fire a log of shots, and write the hits of each", FIRE_HELP, FIRE_EXAMPLES)
+    sub = _command(commands, fire, "fire a log of shots, and write the hits of each", FIRE_HELP)
     sub.add_argument("shots", type=Path, metavar="SHOTS.jsonl", help="log with one shot a line")
     _add_output(sub, "hits.jsonl", "HITS.jsonl", "where to write the hits; the name ends in .jsonl")
     text = "print the total cost of each stage, and the stages that were skipped"
     sub.add_argument("--plan", action="store_true", help=text)
-    sub = _command(commands, new, "write a small scene to start from", NEW_HELP, NEW_EXAMPLES)
+    sub = _command(commands, new, "write a small scene to start from", NEW_HELP)
     sub.add_argument("folder", type=Path, metavar="FOLDER", help="folder to create; its parent must exist")
     sub.add_argument(FROM_IMAGE, type=Path, metavar="PICTURE", help="make the scene of this PNG")
-    sub = _command(commands, compare, "print and draw how two reports differ", COMPARE_HELP, COMPARE_EXAMPLES)
+    sub = _command(commands, compare, "print and draw how two reports differ", COMPARE_HELP)
     sub.add_argument("expected", type=Path, metavar="A.json", help="first report, written by report --json")
     sub.add_argument("got", type=Path, metavar="B.json", help="second report")
     sub.add_argument("-o", "--output", type=Path, metavar="PNG", help="draw both reports to this file")
     text = "scene folder of a report, to draw it on; give it twice if the reports have different scenes"
     sub.add_argument("--scene", type=Path, metavar="SCENE", action="append", help=text)
-    sub = _command(commands, replay, "fire a record of shots again, and compare", REPLAY_HELP, REPLAY_EXAMPLES)
+    sub = _command(commands, replay, "fire a record of shots again, and compare", REPLAY_HELP)
     sub.add_argument("record", type=Path, metavar="RECORD.jsonl", help="file that hitplanes.ShotRecord wrote")
     _add_measurements(commands)
-    _command(commands, warm_up, "compile all kernels of the extra jit", WARM_UP_HELP, "")
-    sub = _command(commands, demo, "animate a quadtree, a grid or a BVH", DEMO_HELP, DEMO_EXAMPLES)
+    _command(commands, warm_up, "compile all kernels of the extra jit", WARM_UP_HELP)
+    sub = _command(commands, demo, "animate a quadtree, a grid or a BVH", DEMO_HELP)
     sub.add_argument("kind", choices=SHOWN, metavar="KIND", help=f"one of {', '.join(SHOWN)}")
     _add_output(sub, "demo.gif", "GIF", "a file that ends in .gif, or a new folder for PNG files")
     return top
@@ -303,7 +287,7 @@ def _add_output(sub: argparse.ArgumentParser, default: str, metavar: str, text: 
 
 
 def _add_measurements(commands: Any) -> None:
-    sub = _command(commands, study, "measure error and run time of all methods", STUDY_HELP, STUDY_EXAMPLES)
+    sub = _command(commands, study, "measure error and run time of all methods", STUDY_HELP)
     text = "folder with scene.json and its images (default: one shape of each kind)"
     sub.add_argument("scene", type=Path, metavar="SCENE", nargs="?", help=text)
     _add_output(sub, "study", "FOLDER", "a new folder, or that of an earlier study, which is replaced")
@@ -311,7 +295,7 @@ def _add_measurements(commands: Any) -> None:
     sub.add_argument("--error", type=float, default=0.01, metavar="E", help=text)
     sub.add_argument("--quick", action="store_true", help="fewer shots and runs: under half a minute")
     sub.add_argument("--seed", type=int, default=0, metavar="N", help="random seed of the shots (default: 0)")
-    sub = _command(commands, stability, "count wrong decisions on hard geometry", STABILITY_HELP, STABILITY_EXAMPLES)
+    sub = _command(commands, stability, "count wrong decisions on hard geometry", STABILITY_HELP)
     _add_output(sub, "stability", "FOLDER", "a new folder, or that of an earlier run, which is replaced")
     text = "a few hundred questions for each cell of the table: seconds instead of half an hour"
     sub.add_argument("--quick", action="store_true", help=text)
@@ -319,7 +303,7 @@ def _add_measurements(commands: Any) -> None:
 
 
 def _add_report(commands: Any) -> None:
-    sub = _command(commands, report, "fire at a scene and draw what was hit", REPORT_HELP, REPORT_EXAMPLES)
+    sub = _command(commands, report, "fire at a scene and draw what was hit", REPORT_HELP)
     text = f"fire the shots of this log, one a line, {REPORTED_MAX} at most"
     sub.add_argument("--shots", type=Path, metavar="SHOTS.jsonl", help=text)
     sub.add_argument("--weapon", metavar="NAME", help="fire one shot with this weapon of the scene; needs --at")
@@ -339,14 +323,13 @@ def _add_report(commands: Any) -> None:
     sub.add_argument("--plan", action="store_true", help=text)
 
 
-def _command(
-    commands: Any, run: Callable[[argparse.Namespace], int | None], summary: str, text: str, examples: str
-) -> argparse.ArgumentParser:
-    """Add a subcommand named like its function; those that fire take a scene first."""
-    raw = argparse.RawDescriptionHelpFormatter
+def _command(commands: Any, run: Run, summary: str, text: str) -> argparse.ArgumentParser:
+    """Add a subcommand named like its function, whose help ends with examples; those that fire take a scene first."""
+    description, _, examples = text.partition("examples:\n")
     sub: argparse.ArgumentParser = commands.add_parser(
-        run.__name__.replace("_", "-"), help=summary, description=text, epilog=examples, formatter_class=raw
-    )
+        run.__name__.replace("_", "-"), help=summary, description=description,
+        epilog=f"examples:\n{examples}" if examples else None, formatter_class=argparse.RawDescriptionHelpFormatter,
+    )  # fmt: skip
     sub.set_defaults(run=run)
     if run in (report, fire, replay):
         sub.add_argument("scene", type=Path, metavar="SCENE", help="folder with scene.json and its images")
