@@ -273,16 +273,17 @@ def _why(detail: RayDetail, rank: int, samples: int, distance: float, out_of_bou
     if reason is not None:
         return WhyNot(item, reason, samples, {}, distance)
     pairs = np.flatnonzero(detail.every.rank == rank)
-    rays = detail.every.ray[pairs]
-    passed = detail.entered[pairs] < ends.fraction[rays]
-    if not passed.any():
+    rays, by = detail.every.ray[pairs], {}
+    if not (detail.entered[pairs] < ends.fraction[rays]).any():
         enders, counts = np.unique(stack.ids[ends.rank[rays[ends.rank[rays] >= 0]]], return_counts=True)
         by = dict(zip(enders.tolist(), counts.tolist(), strict=True))
         spent = bool((ends.reason[rays] == Reason.BUDGET).any())  # a budget of 0: no item ended the ray
-        return WhyNot(item, "behind" if by else "budget" if spent else "outside", samples, by, distance)
-    if detail.ignores and (detail.entered[pairs] == 0).any():
-        return WhyNot(item, "inside", samples, {}, distance)
-    return WhyNot(item, "tunnelled" if detail.in_steps else "outside", samples, {}, distance)
+        reason = "behind" if by else "budget" if spent else "outside"
+    elif detail.ignores and (detail.entered[pairs] == 0).any():
+        reason = "inside"
+    else:
+        reason = "tunnelled" if detail.in_steps else "outside"
+    return WhyNot(item, reason, samples, by, distance)
 
 
 def nearest_miss(detail: RayDetail, hit: Set[int]) -> Miss | None:
