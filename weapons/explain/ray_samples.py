@@ -360,17 +360,12 @@ def gap(begin: Floats, end: Floats, boxes_xyxy: Floats) -> tuple[Floats, Floats,
     along = ((corners - begin) * step).sum(axis=2) / max(float((step**2).sum()), np.finfo(np.float64).tiny)
     on_ray = begin + np.clip(along, 0, 1)[:, :, None] * step
     ends = np.broadcast_to(np.stack([begin, end]), (len(low), 2, 2))
-    on_ray = np.concatenate([on_ray, ends, _crossing(begin, step, low, high)[:, None]], axis=1)
+    first, last = np.clip(slabs(begin, step, low, high), 0, 1)
+    inside = begin + (first + last)[:, None] / 2 * step  # if the segment crosses the box
+    on_ray = np.concatenate([on_ray, ends, inside[:, None]], axis=1)
     on_box = np.clip(on_ray, low[:, None], high[:, None])
     on_box[:, :4] = corners
     distance = np.sqrt(((on_ray - on_box) ** 2).sum(axis=2))
     best = np.argmin(distance, axis=1)
     row = np.arange(len(low))
     return distance[row, best], on_ray[row, best], on_box[row, best]
-
-
-def _crossing(begin: Floats, step: Floats, low: Floats, high: Floats) -> Floats:
-    """Midpoint of the part of the segment inside each box; any point if it does not cross the box."""
-    first, last = slabs(begin, step, low, high)
-    middle = np.clip((np.clip(first, 0, 1) + np.clip(last, 0, 1)) / 2, 0, 1)
-    return np.asarray(begin + middle[:, None] * step)

@@ -121,21 +121,16 @@ def unquoted(value: Any) -> str:
 
 def _rays(was: Entry, now: Entry) -> list[str] | None:
     known = [*entries(was["rays"]), *entries(now["rays"])]
+    pellets, rounds = (any(not same(ray.get(key), 0) for ray in known) for key in ("pellet", "round"))
     lines = []
     for ray, before, after in pairs(was["rays"], now["rays"], "round", "pellet"):
-        name = _ray_name(ray, known)
+        name = f"ray {shown(ray.get('pellet'))}" if pellets else "ray"
+        name += f" of round {shown(ray.get('round'))}" if rounds else ""
         if before is None or after is None:
             lines.append(f"{name} is {'new' if before is None else 'missing'}")
         else:
             lines += [f"{name}: {line}" for line in _lines_of(before, after, {"stop": _stop, "passes": _passes})]
     return first_of(lines) or None
-
-
-def _ray_name(ray: Entry, known: list[Entry]) -> str:
-    """Name of a ray, with its pellet and round if the shot has several."""
-    pellet, rounds = (any(not same(other.get(key), 0) for other in known) for key in ("pellet", "round"))
-    name = f"ray {shown(ray.get('pellet'))}" if pellet else "ray"
-    return f"{name} of round {shown(ray.get('round'))}" if rounds else name
 
 
 def _stop(was: Entry, now: Entry) -> list[str] | None:
