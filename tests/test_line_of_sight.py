@@ -545,12 +545,11 @@ def test_what_a_way_leaves_and_meets_again() -> None:
         squares = [(int(right) - x, int(down) - y) for down, right in np.argwhere(mask)]
         ways = rng.integers(-9, 10, (40, 2)).tolist()
         seen += [(k, right, down, has_a_gap(squares, right, down)) for right, down in ways]
-    most = max(map(len, items))
-    rects = np.array([[*item, *[exits.NO_RECT[0]] * (most - len(item))] for item in items])
-    item, x, y, gap = np.array(seen).T
-    found = kernels_of(exits).left_and_met(rects, item, x, y)
-    assert found.tolist() == np.flatnonzero(gap).tolist()
-    assert 200 < len(found) < 1400 and (x == 0).any() and (y == 0).any()
+    of, every_x, every_y, gaps = np.array(seen).T
+    for k, rects in enumerate(items):
+        x, y, gap = every_x[of == k], every_y[of == k], gaps[of == k]
+        assert kernels_of(exits).left_and_met(rects, x, y).tolist() == np.flatnonzero(gap).tolist()
+    assert 200 < gaps.sum() < 1400 and (every_x == 0).any() and (every_y == 0).any()
 
 
 @pytest.mark.parametrize("kind", ["crumbs", "stripes", "checks", "frame"])

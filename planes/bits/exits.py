@@ -17,14 +17,11 @@ import numpy as np
 from ..common.backend import kernels_of
 from ..common.checks import Floats, Ints
 from ..common.limits import CHUNK_SAMPLES
-from ..grid.spans import begins, each_pixel, pieces, sorted_once
+from ..grid.spans import each_pixel, meets, pieces
 from .bit_rows import WORD, Words
 from .blockers import Blockers
 from .shadows import NEVER, begun, exit_of, shadow, spells, times
 from .span_walk import Runs
-
-NO_RECT = np.array([[1, 1, -1, -1]])
-"""A rectangle without a pixel, which no way meets."""
 
 
 def hide_after_exit(
@@ -34,46 +31,40 @@ def hide_after_exit(
 
     Parameters are those of `hide_behind`. Returned are the other pairs, of ways that begin elsewhere.
     """
-    inside, rects, first, count = begun(origin_xy[pair], blockers, blocker)
-    own, about = pair[inside], np.ceil(np.log2(count)).astype(np.int64)
-    for size in sorted_once(about).tolist():  # blockers of about as many rectangles are looked at together
-        alike = np.flatnonzero(about == size)
-        for part in pieces(np.full(len(alike), rows.shape[1] * WORD), CHUNK_SAMPLES):
-            now = alike[part]
-            _clear_after_exit(rows, corner_xy - origin_xy, own[now], rects, first[now], count[now])
-    return np.delete(pair, inside), np.delete(blocker, inside)
+    starts = np.column_stack([origin_xy[pair], blocker])
+    ways, way = np.unique(starts, axis=0, return_inverse=True)
+    inside, rects, first, count = begun(ways[:, :2], blockers, ways[:, 2])
+    order = np.argsort(way, kind="stable")
+    begin, end = (way[order].searchsorted(inside, side=side).tolist() for side in ("left", "right"))
+    for k, number in enumerate(count.tolist()):
+        own = pair[order[begin[k] : end[k]]]
+        for part in pieces(np.full(len(own), rows.shape[1] * WORD), CHUNK_SAMPLES):
+            _clear_after_exit(rows, corner_xy - origin_xy, own[part], rects[first[k] : first[k] + number])
+    others = (~np.isin(way, inside)).nonzero()[0]
+    return pair[others], blocker[others]
 
 
-def _clear_after_exit(rows: Words, corner_xy: Ints, own: Ints, rects: Ints, first: Ints, count: Ints) -> None:
-    """Clear the pixels of rows `own` that a blocker of each shelters once the way from (0, 0) has left it.
+def _clear_after_exit(rows: Words, corner_xy: Ints, own: Ints, rects: Ints) -> None:
+    """Clear the pixels of rows `own` that an item shelters once the way from (0, 0), where it is, has left it.
 
     Parameters
     ----------
     corner_xy : (n, 2) pixel of bit 0 of the first row
-    first, count : (k,) the rectangles of the blockers
     """
-    pair, bit, column = _pixels_of(rows[own])
-    x, y = np.stack([column, bit]) + corner_xy[own[pair]].T
-    place, every = np.arange(count.max()), np.append(rects, NO_RECT, axis=0)
-    step = max(CHUNK_SAMPLES // len(place), 1)
-    for begin in range(0, len(pair), step):
-        now = slice(begin, begin + step)
-        new = begins(pair[now])
-        here, which = pair[now][new], np.cumsum(new) - 1
-        of_pair = every[np.where(place < count[here, None], first[here, None] + place, -1)]
-        hidden = _met_after_exit(of_pair, which, x[now], y[now]) + begin
-        pixels = ~(np.uint64(1) << column[hidden].astype(np.uint64))
-        np.bitwise_and.at(rows, (own[pair[hidden]], bit[hidden]), pixels)
+    row, bit, column = _pixels_of(rows[own])
+    x, y = np.stack([column, bit]) + corner_xy[own[row]].T
+    hidden = behind_exit(rects, x, y)
+    np.bitwise_and.at(rows, (own[row[hidden]], bit[hidden]), ~(np.uint64(1) << column[hidden].astype(np.uint64)))
 
 
-def _met_after_exit(rects: Ints, item: Ints, x: Ints, y: Ints) -> Ints:
-    """Pixels (s,) that an item, in which the way to them begins, shelters once the way has left it.
-
-    Parameters are those of `left_and_met`.
-    """
-    again = kernels_of(sys.modules[__name__]).left_and_met(rects, item, x, y)
-    hidden = times(rects[item[again]].swapaxes(0, 1), x[again], y[again], True)[0].any(axis=0)
-    return np.asarray(again[hidden])
+def _met_after_exit(rects: Ints, x: Ints, y: Ints) -> Ints:
+    """`behind_exit` of few pixels, of which each is compared with each rectangle."""
+    again = kernels_of(sys.modules[__name__]).left_and_met(rects, x, y)
+    step, found = max(CHUNK_SAMPLES // len(rects), 1), [again[:0]]
+    for begin in range(0, len(again), step):
+        now = again[begin : begin + step]
+        found.append(now[times(rects[:, None], x[now], y[now], True)[0].any(axis=0)])
+    return np.concatenate(found)
 
 
 def _pixels_of(rows: Words) -> tuple[Ints, Ints, Ints]:
@@ -83,21 +74,18 @@ def _pixels_of(rows: Words) -> tuple[Ints, Ints, Ints]:
     return number, row, column
 
 
-def left_and_met(rects: Ints, item: Ints, x: Ints, y: Ints) -> Ints:
+def left_and_met(rects: Ints, x: Ints, y: Ints) -> Ints:
     """Pixels (s,) on the way to which from pixel (0, 0) an item is left and met again.
 
-    The rectangles of an item share no pixel, so the parts of the way in them do not overlap. If they are shorter in sum
-    than the way up to the last exit, there is a gap.
-
-    Parameters
-    ----------
-    rects : (B, m, 4) of each item, of which one holds pixel (0, 0)
-    item : (s,) item of each pixel
+    The rectangles (m, 4) of an item, of which one holds pixel (0, 0), share no pixel, so the parts of the way in them
+    do not overlap. If they are shorter in sum than the way up to the last exit, there is a gap.
     """
-    of_pixel = rects if len(rects) == 1 else rects[item]
-    entry, leave = spells(of_pixel, x[:, None], y[:, None])
-    inside = np.maximum(leave - entry, 0).sum(axis=1)
-    return np.flatnonzero(inside < np.where(entry <= leave, leave, 0).max(axis=1))
+    step, found = max(CHUNK_SAMPLES // len(rects), 1), [np.zeros(0, np.int64)]
+    for begin in range(0, len(x), step):
+        entry, leave = spells(rects[:, None], x[begin : begin + step], y[begin : begin + step])
+        inside = np.maximum(leave - entry, 0).sum(axis=0)
+        found.append(begin + np.flatnonzero(inside < np.where(entry <= leave, leave, 0).max(axis=0)))
+    return np.concatenate(found)
 
 
 def hidden_after_exit(
@@ -113,31 +101,39 @@ def hidden_after_exit(
 
 
 def behind_exit(rects: Ints, x: Ints, y: Ints) -> Ints:
-    """Pixels (s,) that an item (m, 4), which holds pixel (0, 0), shelters once the way to them has left it.
+    """Pixels (s,) that an item (m, 4), which holds pixel (0, 0), shelters once the way to them has left it; rising.
 
     All ways between the directions of two corners that follow each other meet the same rectangles, in the same order.
-    So one way of each such sector tells which rectangle is met first after the exit, and what the others hide there
-    lies behind it. Ways through a corner may touch others; pixels in these directions are looked at one by one.
+    So one way of each such sector tells whether the item is met again, and by which rectangle first; what the others
+    hide there lies behind it. Ways through a corner may touch others; pixels in these directions are looked at one by
+    one.
     """
+    low_xy, high_xy = (np.array([side(v, initial=0) for v in (x, y)]) for side in (np.min, np.max))
+    rects = rects[meets(rects, np.concatenate([low_xy, high_xy]))]  # no way goes beyond this box
+    if len(x) <= 4 * len(rects):
+        return _met_after_exit(rects, x, y)
     sides = 2 * rects + np.array([-1, -1, 1, 1])  # in halves of a pixel
     corners = np.concatenate([sides[:, which] for which in ([0, 1], [2, 1], [2, 3], [0, 3])])
     directions, first = np.unique(_direction(*corners.T), return_index=True)
-    corners, own = corners[first], _direction(x, y)
-    after = directions.searchsorted(own, side="right")
-    through = (directions[after - 1] == own).nonzero()[0]
-    sectors, sector = np.unique(after, return_inverse=True)
-    ways = corners[sectors - 1] + corners[sectors % len(corners)]  # less than half a turn lies between the two
+    corners, n = corners[first], len(first)
+    ways = np.concatenate([corners + np.roll(corners, 1, axis=0), corners])  # less than half a turn lies between two
     ways *= (np.abs(sides).max() // np.abs(ways).max(axis=1) + 1)[:, None]  # to beyond the item
-    step = max(CHUNK_SAMPLES // len(rects), 1)
-    found = [_next_after_exit(rects, *ways[begin : begin + step].T) for begin in range(0, len(ways), step)]
-    rect = np.concatenate(found)[sector]
-    low, high, bare_low, bare_high = shadow(rects[rect], y)
-    hidden = (rect >= 0) & (low <= x) & (x <= high) & ~((bare_low <= x) & (x <= bare_high))
-    hidden[through] = False
-    for begin in range(0, len(through), step):
-        now = through[begin : begin + step]
-        hidden[now[_met_after_exit(rects[None], np.zeros_like(now), x[now], y[now])]] = True
-    return hidden.nonzero()[0]
+    again = np.zeros(2 * n, np.bool_)
+    again[kernels_of(sys.modules[__name__]).left_and_met(rects, *ways.T)] = True
+    if not again.any():
+        return np.zeros(0, np.int64)
+    own = _direction(x, y)
+    after = directions.searchsorted(own, side="right")
+    through, after = directions[after - 1] == own, after % n
+    one_by_one = (through & again[n + (after - 1) % n]).nonzero()[0]
+    found = [one_by_one[_met_after_exit(rects, x[one_by_one], y[one_by_one])]]
+    maybe = (~through & again[after]).nonzero()[0]
+    sectors, sector = np.unique(after[maybe], return_inverse=True)
+    rect = _next_after_exit(rects, ways[sectors])[sector]
+    low, high, bare_low, bare_high = shadow(rects[rect], y[maybe])
+    hidden = (low <= x[maybe]) & (x[maybe] <= high) & ~((bare_low <= x[maybe]) & (x[maybe] <= bare_high))
+    found.append(maybe[hidden])
+    return np.sort(np.concatenate(found))
 
 
 def _direction(x: Ints, y: Ints) -> Floats:
@@ -149,11 +145,13 @@ def _direction(x: Ints, y: Ints) -> Floats:
     return np.asarray(np.where(x < 0, 2 - slope, slope))
 
 
-def _next_after_exit(rects: Ints, x: Ints, y: Ints) -> Ints:
-    """Rectangle of an item that ways (n,) from pixel (0, 0) to a pixel beyond it meet once they have left it; or -1."""
-    entry, leave = spells(rects[:, None], x, y)
-    met = entry <= leave
-    entry = np.where(met, entry, NEVER)
-    entry[entry <= exit_of(entry, np.where(met, leave, -1))] = NEVER
-    rect = entry.argmin(axis=0)
-    return np.where(entry[rect, np.arange(len(rect))] < NEVER, rect, -1)
+def _next_after_exit(rects: Ints, ways: Ints) -> Ints:
+    """Rectangle of an item that ways (n, 2) from pixel (0, 0) to pixels beyond it meet first once they have left it."""
+    step, found = max(CHUNK_SAMPLES // len(rects), 1), [np.zeros(0, np.int64)]
+    for begin in range(0, len(ways), step):
+        entry, leave = spells(rects[:, None], *ways[begin : begin + step].T)
+        met = entry <= leave
+        entry = np.where(met, entry, NEVER)
+        entry[entry <= exit_of(entry, np.where(met, leave, -1))] = NEVER
+        found.append(entry.argmin(axis=0))
+    return np.concatenate(found)

@@ -242,16 +242,16 @@ def _hide_behind(rows, corner, origin, box, begin, rects, bounds, pair, blocker)
                     rows[own, row] &= ~_shadow(x_min, y_min, x_max, y_max, top + row, left)
 
 
-@compiled(types.int64(types.Array(types.int64, 3, "C", readonly=True), INTS, INTS, INTS, OUT))
-def _left_and_met(rects, item, x, y, again):
+@compiled(types.int64(BOXES, INTS, INTS, OUT))
+def _left_and_met(rects, x, y, again):
     count = 0
     for i in range(len(x)):
         across, down = max(abs(x[i]), 1), max(abs(y[i]), 1)
-        inside, last, own = 0, 0, rects[item[i]]
-        for r in range(len(own)):
+        inside, last = 0, 0
+        for r in range(len(rects)):
             entry, leave = 0, 2 * across * down
             for axis, step, scale in ((0, x[i], down), (1, y[i], across)):
-                low, high = 2 * own[r, axis] - 1, 2 * own[r, axis + 2] + 1
+                low, high = 2 * rects[r, axis] - 1, 2 * rects[r, axis + 2] + 1
                 if step > 0:
                     entry, leave = max(entry, low * scale), min(leave, high * scale)
                 elif step < 0:
@@ -265,10 +265,10 @@ def _left_and_met(rects, item, x, y, again):
     return count
 
 
-def left_and_met(rects: Ints, item: Ints, x: Ints, y: Ints) -> Ints:
+def left_and_met(rects: Ints, x: Ints, y: Ints) -> Ints:
     """See `bits.exits.left_and_met`."""
     again = np.empty(len(x), np.int64)
-    return again[: _left_and_met(rects, item, x, y, again)]
+    return again[: _left_and_met(rects, x, y, again)]
 
 
 def hide_behind(rows: Words, corner_xy: Ints, origin_xy: Ints, blockers: Blockers, pair: Ints, blocker: Ints) -> None:
