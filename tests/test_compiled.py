@@ -479,6 +479,11 @@ def test_a_warm_up_needs_numba(monkeypatch: pytest.MonkeyPatch) -> None:
         warm_up()
 
 
+def test_the_progress_of_a_warm_up_is_a_function() -> None:
+    with pytest.raises(InputError, match=r"^progress: expected a function, got int$"):
+        warm_up(5)  # type: ignore[arg-type]
+
+
 def helpers_of(source: str) -> dict[str, tuple[ast.FunctionDef, bool]]:
     """Helpers of kernels in a source, by name, each with whether it says that it allocates."""
     functions = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.FunctionDef)]

@@ -736,3 +736,14 @@ def test_an_id_far_away_does_not_fill_the_memory(tmp_path: Path, monkeypatch: py
     monkeypatch.setattr(Items, "_reserve", careful)
     with pytest.raises(InputError, match=r"id"):
         load_scene(folder_of(tmp_path, {"format": FORMAT, "objects": {"hud": [{**PLACED, "id": 2**31}]}}))
+
+
+def test_masks_of_a_loaded_scene_are_made_all_together(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene, made = Scene((99, 99)), []
+    for k in range(20):
+        scene.add(np.ones((5, 9), np.bool_), (50, 50), angle=7.0 * k + 1)
+    scene.save(tmp_path / "scene")
+    make = Items.make_masks
+    monkeypatch.setattr(Items, "make_masks", lambda items: made.append(len(items.unmade)) or make(items))
+    loaded = load_scene(tmp_path / "scene")
+    assert fire(loaded, Disc(3), (50, 50)) and made == [20]

@@ -457,16 +457,16 @@ def _add_entries(scene: Scene, entries: Sequence[Entry], next_id: int | None) ->
     numbered = [entry.id is not None for entry in entries]
     if any(numbered) and not all(numbered):
         raise InputError("objects: expected an id for each object or for none, got some")
-    entries = sorted(entries, key=lambda entry: entry.id or 0)
+    entries, items = sorted(entries, key=lambda entry: entry.id or 0), scene.items
     for entry in entries:
         with within(entry.place):
             if entry.id is not None:
-                if entry.id < scene.items.count:
+                if entry.id < items.count:
                     raise InputError(f"id: expected each id once, got {entry.id} again")
-                scene.items.table.skip_to(entry.id)
-            scene.add(**entry.options)
+                items.table.skip_to(entry.id)
+            scene.add(**entry.options)  # masks are made all together, when the scene is first read
     if next_id is not None:
-        scene.items.table.skip_to(integer("next_id", next_id, scene.items.count, IDS_MAX))
+        items.table.skip_to(integer("next_id", next_id, items.count, IDS_MAX))
     for item, entry in zip(scene.ids().tolist(), entries, strict=True):
         if entry.owner is not None:
             with within(entry.place):

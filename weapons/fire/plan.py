@@ -123,6 +123,7 @@ class Plan:
         known = self._stage_of.setdefault(stage.name, stage)
         if known is stage:
             self._ran.append(stage)
+            self._left_out = [other for other in self._left_out if other.name != stage.name]
         else:
             known.add(stage)
 

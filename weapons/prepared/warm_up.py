@@ -9,6 +9,7 @@ from importlib import import_module
 import numpy as np
 
 from hitplanes.planes.common.backend import COMPILED, use_jit
+from hitplanes.planes.common.checks import InputError, kind_of
 from hitplanes.planes.scene.scene import Scene
 
 from ..fire.call import fire
@@ -31,8 +32,10 @@ def warm_up(progress: Callable[[int, int], None] | None = None) -> float:
     Raises
     ------
     InputError
-        If numba (the extra `jit`) is not installed.
+        If numba (the extra `jit`) is not installed, or `progress` is no function.
     """
+    if progress is not None and not callable(progress):
+        raise InputError(f"progress: expected a function, got {kind_of(progress)}")
     begin = time.perf_counter()
     use_jit()
     steps: list[Callable[[], object]] = [
