@@ -552,6 +552,7 @@ def test_what_a_way_leaves_and_meets_again() -> None:
     assert 200 < gaps.sum() < 1400 and (every_x == 0).any() and (every_y == 0).any()
 
 
+@pytest.mark.usefixtures("jit")
 @pytest.mark.parametrize("kind", ["crumbs", "stripes", "checks", "frame"])
 def test_what_lies_behind_an_item_that_ways_begin_in(kind: str) -> None:
     """All pixels around a mask at once, also those in the directions of its corners, against the pixels on each way."""

@@ -161,6 +161,10 @@ def test_the_sizes_of_a_stack_are_its_own() -> None:
     assert scene.items.stack().sizes[1] == (8, 3)
     scene.move(ids[1], (24, 15))
     assert scene.items.stack().sizes[1] == (23, 13)
+    for x in range(40):
+        scene.add(np.ones((3, 3), np.bool_), (2 * x, x))
+    (wide, high), (width, height) = scene.items.stack().sizes
+    assert (wide, high) == (3, 3) and 66 < width <= 81 and 33 < height <= 42  # around some of the 42 items
 
 
 NAN, INF, FAR = float("nan"), float("inf"), 2.0**40

@@ -34,25 +34,25 @@ def hide_after_exit(
     starts = np.column_stack([origin_xy[pair], blocker])
     ways, way = np.unique(starts, axis=0, return_inverse=True)
     inside, rects, first, count = begun(ways[:, :2], blockers, ways[:, 2])
-    order = np.argsort(way, kind="stable")
+    order, corner = np.argsort(way, kind="stable"), corner_xy - origin_xy
     begin, end = (way[order].searchsorted(inside, side=side).tolist() for side in ("left", "right"))
     for k, number in enumerate(count.tolist()):
         own = pair[order[begin[k] : end[k]]]
         for part in pieces(np.full(len(own), rows.shape[1] * WORD), CHUNK_SAMPLES):
-            _clear_after_exit(rows, corner_xy - origin_xy, own[part], rects[first[k] : first[k] + number])
+            _clear_after_exit(rows, corner, own[part], rects[first[k] : first[k] + number])
     others = (~np.isin(way, inside)).nonzero()[0]
     return pair[others], blocker[others]
 
 
-def _clear_after_exit(rows: Words, corner_xy: Ints, own: Ints, rects: Ints) -> None:
-    """Clear the pixels of rows `own` that an item shelters once the way from (0, 0), where it is, has left it.
+def _clear_after_exit(rows: Words, corner: Ints, own: Ints, rects: Ints) -> None:
+    """Clear the pixels of rows `own` that an item, in which pixel (0, 0) lies, shelters once the way has left it.
 
     Parameters
     ----------
-    corner_xy : (n, 2) pixel of bit 0 of the first row
+    corner : (n, 2) pixel of bit 0 of the first row, from (0, 0)
     """
     row, bit, column = _pixels_of(rows[own])
-    x, y = np.stack([column, bit]) + corner_xy[own[row]].T
+    x, y = np.stack([column, bit]) + corner[own[row]].T
     hidden = behind_exit(rects, x, y)
     np.bitwise_and.at(rows, (own[row[hidden]], bit[hidden]), ~(np.uint64(1) << column[hidden].astype(np.uint64)))
 
@@ -60,11 +60,17 @@ def _clear_after_exit(rows: Words, corner_xy: Ints, own: Ints, rects: Ints) -> N
 def _met_after_exit(rects: Ints, x: Ints, y: Ints) -> Ints:
     """`behind_exit` of few pixels, of which each is compared with each rectangle."""
     again = kernels_of(sys.modules[__name__]).left_and_met(rects, x, y)
-    step, found = max(CHUNK_SAMPLES // len(rects), 1), [again[:0]]
-    for begin in range(0, len(again), step):
-        now = again[begin : begin + step]
+    found = [again[:0]]
+    for part in _parts(len(again), rects):
+        now = again[part]
         found.append(now[times(rects[:, None], x[now], y[now], True)[0].any(axis=0)])
     return np.concatenate(found)
+
+
+def _parts(n: int, rects: Ints) -> Iterator[slice]:
+    """Parts of n ways, each of which is compared with all rectangles at a time."""
+    step = max(CHUNK_SAMPLES // len(rects), 1)
+    return (slice(begin, begin + step) for begin in range(0, n, step))
 
 
 def _pixels_of(rows: Words) -> tuple[Ints, Ints, Ints]:
@@ -80,11 +86,11 @@ def left_and_met(rects: Ints, x: Ints, y: Ints) -> Ints:
     The rectangles (m, 4) of an item, of which one holds pixel (0, 0), share no pixel, so the parts of the way in them
     do not overlap. If they are shorter in sum than the way up to the last exit, there is a gap.
     """
-    step, found = max(CHUNK_SAMPLES // len(rects), 1), [np.zeros(0, np.int64)]
-    for begin in range(0, len(x), step):
-        entry, leave = spells(rects[:, None], x[begin : begin + step], y[begin : begin + step])
+    found = [np.zeros(0, np.int64)]
+    for part in _parts(len(x), rects):
+        entry, leave = spells(rects[:, None], x[part], y[part])
         inside = np.maximum(leave - entry, 0).sum(axis=0)
-        found.append(begin + np.flatnonzero(inside < np.where(entry <= leave, leave, 0).max(axis=0)))
+        found.append(part.start + np.flatnonzero(inside < np.where(entry <= leave, leave, 0).max(axis=0)))
     return np.concatenate(found)
 
 
@@ -110,7 +116,7 @@ def behind_exit(rects: Ints, x: Ints, y: Ints) -> Ints:
     """
     low_xy, high_xy = (np.array([side(v, initial=0) for v in (x, y)]) for side in (np.min, np.max))
     rects = rects[meets(rects, np.concatenate([low_xy, high_xy]))]  # no way goes beyond this box
-    if len(x) <= 4 * len(rects):
+    if len(x) <= 4 * len(rects):  # no more than there are corners
         return _met_after_exit(rects, x, y)
     sides = 2 * rects + np.array([-1, -1, 1, 1])  # in halves of a pixel
     corners = np.concatenate([sides[:, which] for which in ([0, 1], [2, 1], [2, 3], [0, 3])])
@@ -147,9 +153,9 @@ def _direction(x: Ints, y: Ints) -> Floats:
 
 def _next_after_exit(rects: Ints, ways: Ints) -> Ints:
     """Rectangle of an item that ways (n, 2) from pixel (0, 0) to pixels beyond it meet first once they have left it."""
-    step, found = max(CHUNK_SAMPLES // len(rects), 1), [np.zeros(0, np.int64)]
-    for begin in range(0, len(ways), step):
-        entry, leave = spells(rects[:, None], *ways[begin : begin + step].T)
+    found = [np.zeros(0, np.int64)]
+    for part in _parts(len(ways), rects):
+        entry, leave = spells(rects[:, None], *ways[part].T)
         met = entry <= leave
         entry = np.where(met, entry, NEVER)
         entry[entry <= exit_of(entry, np.where(met, leave, -1))] = NEVER
